@@ -1,0 +1,142 @@
+#include "cameras/camera.h"
+
+#include <algorithm>
+#include <sstream>
+#include <stdexcept>
+#include <utility>
+
+namespace dlsd {
+namespace {
+
+[[noreturn]] void fail(std::string_view what, double value, std::string_view allowed) {
+  std::ostringstream message;
+  message.precision(17);
+  message << what << " = " << value << " is out of range: allowed is " << allowed;
+  throw std::invalid_argument(message.str());
+}
+
+std::string rangeText(double lo, double hi) {
+  std::ostringstream text;
+  text << "[" << lo << ", " << hi << "]";
+  return text.str();
+}
+
+template <class M>
+void checkParams(const M& model) {
+  const auto values = model.params();
+  for (size_t i = 0; i < values.size(); ++i) {
+    const ParamSpec& spec = M::kParams[i];
+    if (!(values[i] >= spec.min && values[i] <= spec.max)) {
+      fail(std::string(M::kName) + " parameter " + std::string(spec.name),
+           values[i],
+           rangeText(spec.min, spec.max));
+    }
+  }
+}
+
+double fieldAngle(const Eigen::Vector3d& ray) {
+  return std::atan2(std::hypot(ray.x(), ray.y()), ray.z());
+}
+
+template <size_t I = 0>
+CameraModelVariant makeModel(std::string_view name, std::span<const double> params) {
+  if constexpr (I < std::variant_size_v<CameraModelVariant>) {
+    using M = std::variant_alternative_t<I, CameraModelVariant>;
+    if (name != M::kName) return makeModel<I + 1>(name, params);
+    constexpr size_t kCount = M::kParams.size();
+    if (params.size() != kCount) {
+      throw std::invalid_argument("model " + std::string(name) + " takes " +
+                                  std::to_string(kCount) + " parameters, got " +
+                                  std::to_string(params.size()));
+    }
+    std::array<double, kCount> values{};
+    std::copy(params.begin(), params.end(), values.begin());
+    // Before fromParams derives anything from them.
+    for (size_t i = 0; i < kCount; ++i) {
+      const ParamSpec& spec = M::kParams[i];
+      if (!(values[i] >= spec.min && values[i] <= spec.max)) {
+        fail(std::string(M::kName) + " parameter " + std::string(spec.name),
+             values[i],
+             rangeText(spec.min, spec.max));
+      }
+    }
+    return M::fromParams(values);
+  } else {
+    throw std::invalid_argument("unknown camera model '" + std::string(name) + "'");
+  }
+}
+
+}  // namespace
+
+Camera::Camera(const CameraModelVariant& model, int width, int height, double max_field_angle_rad)
+    : model_(model), width_(width), height_(height), max_field_angle_rad_(max_field_angle_rad) {
+  std::visit([](const auto& m) { checkParams(m); }, model_);
+  if (width < 1 || width > 65535) fail("image width", width, "[1, 65535]");
+  if (height < 1 || height > 65535) fail("image height", height, "[1, 65535]");
+  if (!(max_field_angle_rad > 0 && max_field_angle_rad <= M_PI)) {
+    fail("max_field_angle", max_field_angle_rad, "(0, pi] rad");
+  }
+}
+
+double Camera::maxFieldAngle() const {
+  return std::visit([&](const auto& m) { return std::min(m.maxFieldAngle(), max_field_angle_rad_); },
+                    model_);
+}
+
+std::string_view Camera::modelName() const {
+  return std::visit([](const auto& m) { return std::decay_t<decltype(m)>::kName; }, model_);
+}
+
+std::span<const ParamSpec> Camera::paramSpecs() const {
+  return std::visit(
+      [](const auto& m) -> std::span<const ParamSpec> { return std::decay_t<decltype(m)>::kParams; },
+      model_);
+}
+
+std::vector<double> Camera::params() const {
+  return std::visit(
+      [](const auto& m) {
+        const auto p = m.params();
+        return std::vector<double>(p.begin(), p.end());
+      },
+      model_);
+}
+
+std::optional<Eigen::Vector2d> Camera::project(const Eigen::Vector3d& ray_in_cam) const {
+  const Pixel<double> p = std::visit(
+      [&](const auto& m) { return m.project(ray_in_cam.x(), ray_in_cam.y(), ray_in_cam.z()); },
+      model_);
+  if (!p.valid) return std::nullopt;
+  if (max_field_angle_rad_ < M_PI && !(fieldAngle(ray_in_cam) <= max_field_angle_rad_)) {
+    return std::nullopt;
+  }
+  return Eigen::Vector2d(p.u, p.v);
+}
+
+std::optional<Eigen::Vector3d> Camera::unproject(const Eigen::Vector2d& pixel) const {
+  const Ray<double> r =
+      std::visit([&](const auto& m) { return m.unproject(pixel.x(), pixel.y()); }, model_);
+  if (!r.valid) return std::nullopt;
+  const Eigen::Vector3d ray(r.x, r.y, r.z);
+  if (max_field_angle_rad_ < M_PI && !(fieldAngle(ray) <= max_field_angle_rad_)) {
+    return std::nullopt;
+  }
+  return ray;
+}
+
+std::optional<ProjectionJacobian> Camera::jacobian(const Eigen::Vector3d& ray_in_cam) const {
+  if (!project(ray_in_cam)) return std::nullopt;
+  return std::visit(
+      [&](const auto& m) { return m.jacobian(ray_in_cam.x(), ray_in_cam.y(), ray_in_cam.z()); },
+      model_);
+}
+
+Camera makeCamera(std::string_view model_name,
+                  std::span<const double> params,
+                  int width,
+                  int height,
+                  double max_field_angle_rad) {
+  return {makeModel(model_name, params), width, height, max_field_angle_rad};
+}
+
+}  // namespace dlsd

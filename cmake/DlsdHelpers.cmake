@@ -1,0 +1,48 @@
+# Helpers shared by every module's CMakeLists.txt.
+
+# Warnings are a private interface target, so they never reach a consumer of the installed package.
+add_library(dlsd_warnings INTERFACE)
+target_compile_options(dlsd_warnings INTERFACE -Wall -Wextra -Wpedantic -Wconversion -Wshadow
+                       $<$<BOOL:${DLSD_WERROR}>:-Werror>)
+
+# dlsd_add_library(NAME SOURCES a.cpp ... HEADERS a.h ... PUBLIC libs... PRIVATE libs...)
+# Builds the static library dlsd_NAME with the alias dlsd::NAME, installs it and its headers.
+function(dlsd_add_library name)
+  cmake_parse_arguments(ARG "NO_INSTALL" "" "SOURCES;HEADERS;PUBLIC;PRIVATE" ${ARGN})
+  set(target dlsd_${name})
+  add_library(${target} STATIC ${ARG_SOURCES})
+  add_library(dlsd::${name} ALIAS ${target})
+  target_compile_features(${target} PUBLIC cxx_std_20)
+  target_include_directories(${target} PUBLIC
+    $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}> $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}/dlsd>)
+  target_link_libraries(${target} PUBLIC ${ARG_PUBLIC} PRIVATE ${ARG_PRIVATE} $<BUILD_INTERFACE:dlsd_warnings>)
+  set_target_properties(${target} PROPERTIES EXPORT_NAME ${name} POSITION_INDEPENDENT_CODE ON)
+  if(NOT ARG_NO_INSTALL)
+    install(TARGETS ${target} EXPORT dlsdTargets ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
+    foreach(header ${ARG_HEADERS})
+      file(RELATIVE_PATH folder ${PROJECT_SOURCE_DIR} ${CMAKE_CURRENT_SOURCE_DIR}/${header})
+      get_filename_component(folder ${folder} DIRECTORY)
+      install(FILES ${header} DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/dlsd/${folder})
+    endforeach()
+  endif()
+endfunction()
+
+# dlsd_add_test(NAME LABELS quick SOURCES a_test.cpp ... LIBS ...)
+# One GoogleTest binary; each of its tests becomes a ctest of its own. Found only when DLSD_TESTS is on.
+function(dlsd_add_test name)
+  if(NOT DLSD_TESTS)
+    return()
+  endif()
+  cmake_parse_arguments(ARG "" "TIMEOUT" "SOURCES;LIBS;LABELS" ${ARGN})
+  if(NOT ARG_LABELS)
+    set(ARG_LABELS quick)
+  endif()
+  if(NOT ARG_TIMEOUT)
+    set(ARG_TIMEOUT 300)
+  endif()
+  add_executable(${name} ${ARG_SOURCES})
+  target_link_libraries(${name} PRIVATE ${ARG_LIBS} GTest::gmock GTest::gtest_main dlsd_warnings)
+  target_compile_definitions(${name} PRIVATE DLSD_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
+  gtest_discover_tests(${name} DISCOVERY_TIMEOUT 60
+                       PROPERTIES LABELS "${ARG_LABELS}" TIMEOUT ${ARG_TIMEOUT})
+endfunction()
