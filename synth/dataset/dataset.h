@@ -14,8 +14,8 @@ namespace dlsd {
 /// Read access to a finished dataset folder. Frames are loaded one at a time.
 class Dataset {
  public:
-  /// Reads manifest.json and the cameras. Throws InputError if the folder is not a dataset or a file
-  /// named in the manifest is missing.
+  /// Reads manifest.json and the cameras. Throws InputError if the folder is not a dataset or a
+  /// file named in the manifest is missing.
   explicit Dataset(const std::string& folder);
 
   [[nodiscard]] const std::string& folder() const { return folder_; }

@@ -7,7 +7,8 @@
 
 namespace dlsd {
 
-/// An owned image, rows top to bottom without padding, channels interleaved as R, G, B (, A) when > 1.
+/// An owned image, rows top to bottom without padding, channels interleaved as R, G, B (, A) when
+/// > 1.
 struct Image {
   int width = 0, height = 0, channels = 1;
   int bits = 8;                ///< 8 or 16.

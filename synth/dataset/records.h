@@ -70,9 +70,11 @@ struct DetectionRecord {
 [[nodiscard]] nlohmann::ordered_json toJson(const LabelRecord& record);
 [[nodiscard]] nlohmann::ordered_json toJson(const DetectionRecord& record);
 
-/// `source` names the file (and line) in messages. Throw InputError (calibration/files.h) with source,
-/// key, value and what is allowed, for anything missing, of the wrong type, not finite or unknown.
-[[nodiscard]] LabelRecord labelRecordFromJson(const nlohmann::json& json, const std::string& source);
+/// `source` names the file (and line) in messages. Throw InputError (calibration/files.h) with
+/// source, key, value and what is allowed, for anything missing, of the wrong type, not finite or
+/// unknown.
+[[nodiscard]] LabelRecord labelRecordFromJson(const nlohmann::json& json,
+                                              const std::string& source);
 [[nodiscard]] DetectionRecord detectionRecordFromJson(const nlohmann::json& json,
                                                       const std::string& source);
 

@@ -1,0 +1,61 @@
+#pragma once
+// generate: (cameras, scene preset, seed, count) -> a dataset folder.
+
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "cameras/camera.h"
+#include "synth/dataset/image.h"
+#include "synth/dataset/records.h"
+#include "synth/sensor.h"
+
+namespace dlsd {
+
+struct GenerateOptions {
+  /// Name (file stem: letters, digits, '_', '-') and camera. Frame i is seen by camera i mod n.
+  std::vector<std::pair<std::string, Camera>> cameras;
+  std::string scene = "room";  ///< A preset: one of scenePresets() (scene.h).
+  uint64_t seed = 0;
+  int count = 1;    ///< Frames, in [1, 10000000].
+  std::string out;  ///< Dataset folder; created if absent.
+  SensorOptions sensor;
+  int jobs = 0;         ///< Threads; 0 = all cores.
+  int shard_index = 0;  ///< This run makes the frames i with i mod shard_count == shard_index ...
+  int shard_count = 1;  ///< ... and, if > 1, manifest-i-of-n.json in place of manifest.json.
+
+  /// Throws std::invalid_argument naming the field, its value and what is allowed.
+  void check() const;
+};
+
+struct GenerateProgress {
+  int done, total;  ///< Frames of this shard.
+};
+
+struct GenerateResult {
+  int written, kept;  ///< Frames.
+};
+
+/// Writes images/NNNNNN.png, labels/NNNNNN.json, cameras/NAME.yaml and, last, the manifest. Every
+/// file is written atomically; its bytes depend on the options but not on jobs, shards or earlier
+/// runs. A folder whose complete manifest says the same configuration is verified by sha256; frames
+/// whose files are missing or differ are made again, the others are kept. Without a manifest (an
+/// interrupted run) everything is made again. Throws std::invalid_argument (check()), InputError if
+/// the folder holds another dataset, SystemError if a file can't be written. on_progress may be
+/// empty; it is called by one thread at a time.
+GenerateResult generateDataset(const GenerateOptions& options,
+                               const std::function<void(const GenerateProgress&)>& on_progress);
+
+/// One frame in memory.
+struct Frame {
+  LabelRecord labels;
+  Image image;                  ///< Gray, 8 bit.
+  std::vector<float> radiance;  ///< Linear light after optical blur, before noise; row-major.
+};
+
+/// Frame `index` as generateDataset would write it; `out`, `count` and jobs are not looked at.
+[[nodiscard]] Frame renderFrame(const GenerateOptions& options, uint64_t index);
+
+}  // namespace dlsd
