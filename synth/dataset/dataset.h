@@ -3,6 +3,7 @@
 
 #include <map>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "cameras/camera.h"
@@ -10,6 +11,9 @@
 #include "synth/dataset/records.h"
 
 namespace dlsd {
+
+/// "format" of manifest.json.
+inline constexpr std::string_view kDatasetFormat = "dlsd-dataset/1";
 
 /// Read access to a finished dataset folder. Frames are loaded one at a time.
 class Dataset {

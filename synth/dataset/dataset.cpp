@@ -1,0 +1,96 @@
+#include "synth/dataset/dataset.h"
+
+#include <openssl/evp.h>
+
+#include <filesystem>
+
+#include "cameras/calibration/calibration.h"
+#include "cameras/calibration/files.h"
+#include "synth/dataset/json_fields.h"
+
+namespace dlsd {
+namespace {
+
+/// A path inside the folder that the manifest names: relative, and not out of the folder.
+std::string insidePath(const JsonField& field) {
+  const std::string path = field.text();
+  const std::filesystem::path p(path);
+  bool inside = p.is_relative();
+  for (const auto& part : p) inside = inside && part != "..";
+  if (!inside) field.fail("must be a path inside the data folder");
+  return path;
+}
+
+}  // namespace
+
+Dataset::Dataset(const std::string& folder) : folder_(folder) {
+  namespace fs = std::filesystem;
+  const std::string path = folder + "/manifest.json";
+  if (!fs::exists(path)) {
+    throw InputError(folder + ": not a finished dataset: manifest.json is missing");
+  }
+  const nlohmann::json document = parseJson(readFile(path), path);
+  const JsonField manifest(document, path);
+  const JsonField format = manifest["format"];
+  if (format.text() != kDatasetFormat)
+    format.fail("must be \"" + std::string(kDatasetFormat) + "\"");
+  for (const JsonField& camera : manifest["cameras"].array(1)) {
+    const std::string name = insidePath(camera["file"]);
+    cameras_.emplace(name, loadCamera(folder + "/" + name));
+  }
+  for (const JsonField& frame : manifest["frames"].array()) {
+    for (const char* key : {"image", "labels"}) {
+      const std::string file = insidePath(frame[key]);
+      if (!fs::exists(folder + "/" + file)) {
+        throw InputError(folder + ": " + file + " is named in the manifest, but missing");
+      }
+    }
+    label_paths_.push_back(frame["labels"].text());
+  }
+  manifest_ = nlohmann::ordered_json::parse(readFile(path));
+}
+
+LabelRecord Dataset::labels(size_t i) const {
+  const std::string path = folder_ + "/" + label_paths_.at(i);
+  LabelRecord record = labelRecordFromJson(parseJson(readFile(path), path), path);
+  if (!cameras_.contains(record.camera)) {
+    throw InputError(path + ": camera = \"" + record.camera + "\" is not in the manifest");
+  }
+  return record;
+}
+
+const Camera& Dataset::camera(const LabelRecord& record) const {
+  const auto it = cameras_.find(record.camera);
+  if (it == cameras_.end()) {
+    throw InputError(folder_ + ": camera \"" + record.camera + "\" is not in the manifest");
+  }
+  return it->second;
+}
+
+Image Dataset::image(const LabelRecord& record) const {
+  const std::string path = folder_ + "/" + record.image;
+  Image image = readImage(path);
+  if (image.width != record.width || image.height != record.height) {
+    throw InputError(path + ": is " + std::to_string(image.width) + "x" +
+                     std::to_string(image.height) + " px, its label record says " +
+                     std::to_string(record.width) + "x" + std::to_string(record.height));
+  }
+  return image;
+}
+
+std::string sha256Hex(std::string_view bytes) {
+  unsigned char digest[EVP_MAX_MD_SIZE];
+  unsigned int length = 0;
+  if (EVP_Digest(bytes.data(), bytes.size(), digest, &length, EVP_sha256(), nullptr) != 1) {
+    throw SystemError("sha256 is not available");
+  }
+  std::string hex;
+  for (unsigned int i = 0; i < length; ++i) {
+    constexpr char kDigits[] = "0123456789abcdef";
+    hex += kDigits[digest[i] >> 4];
+    hex += kDigits[digest[i] & 15];
+  }
+  return hex;
+}
+
+}  // namespace dlsd
