@@ -1,6 +1,6 @@
 #pragma once
-// A 3D line segment as a central camera sees it: an arc of a great circle of the unit sphere. Labels
-// and detections are both arcs; metrics and drawing work on their image curves.
+// A 3D line segment as a central camera sees it: an arc of a great circle of the unit sphere.
+// Labels and detections are both arcs; metrics and drawing work on their image curves.
 
 #include <Eigen/Core>
 #include <optional>
@@ -52,13 +52,23 @@ struct ImageSpan {
 };
 
 /// The pieces of an arc that the camera images, in order. Cut at the image border (kBorder) and at
-/// the bound of the camera's domain (kRim), each located to 1e-12 of the arc. Pieces that enter and
-/// leave within less than about 2 px or 0.2 degrees may be missed.
+/// the bound of the camera's domain (kRim), each located to 1e-12 of the arc.
+///
+/// Guarantee: every piece and every gap between pieces that is longer than 0.1 degrees on the arc
+/// or 2 px in the image is found. Shorter ones may be missed; then the neighbours are reported as
+/// if it were not there. A stretch of the arc is skipped without a closer look only if it is
+/// outside the cone of all image rays, or if its ends are further from image border and domain
+/// bound than the stretch is long: on the sphere exactly, in the image with the larger of the
+/// scales (px per rad, largest singular value of the projection's Jacobian) at its ends times 1.5.
+/// That bound holds for cameras whose scale does not rise above 1.5 times its larger end value
+/// inside a stretch of 4 degrees, as for all admissible pinhole and omni cameras, FoV with omega >=
+/// 0.2, and Kannala-Brandt lenses that turn by less than 50 % in 4 degrees.
 [[nodiscard]] std::vector<ImageSpan> imageSpans(const Camera& camera, const Arc& arc);
 
 /// Points on the image of the piece [t0, t1] of an arc, first and last included, joined by straight
-/// pieces that keep within max_chord_err_px of the true curve. The piece must be imaged throughout
-/// (a span of imageSpans); a point that falls out of the domain by rounding is left out.
+/// pieces that keep within max_chord_err_px of the true curve: measured at the middle of each piece
+/// (and at the quarters of the four it starts from). The piece must be imaged throughout (a span of
+/// imageSpans); a point that falls out of the domain by rounding is left out.
 [[nodiscard]] std::vector<Eigen::Vector2d> imageCurve(
     const Camera& camera, const Arc& arc, double t0, double t1, double max_chord_err_px = 0.01);
 

@@ -21,9 +21,9 @@ std::string rangeText(double lo, double hi) {
   return text.str();
 }
 
+/// The model with these parameters, after a check that they are admissible.
 template <class M>
-void checkParams(const M& model) {
-  const auto values = model.params();
+M makeChecked(const std::array<double, M::kParams.size()>& values) {
   for (size_t i = 0; i < values.size(); ++i) {
     const ParamSpec& spec = M::kParams[i];
     if (!(values[i] >= spec.min && values[i] <= spec.max)) {
@@ -32,10 +32,26 @@ void checkParams(const M& model) {
            rangeText(spec.min, spec.max));
     }
   }
+  return M::fromParams(values);
 }
 
 double fieldAngle(const Eigen::Vector3d& ray) {
   return std::atan2(std::hypot(ray.x(), ray.y()), ray.z());
+}
+
+template <size_t I = 0>
+std::string modelNames() {
+  if constexpr (I < std::variant_size_v<CameraModelVariant>) {
+    using M = std::variant_alternative_t<I, CameraModelVariant>;
+    return (I > 0 ? ", " : "") + std::string(M::kName) + modelNames<I + 1>();
+  } else {
+    return "";
+  }
+}
+
+[[noreturn]] void failUnknownModel(std::string_view name) {
+  throw std::invalid_argument("unknown camera model '" + std::string(name) + "': allowed are " +
+                              modelNames());
 }
 
 template <size_t I = 0>
@@ -51,36 +67,44 @@ CameraModelVariant makeModel(std::string_view name, std::span<const double> para
     }
     std::array<double, kCount> values{};
     std::copy(params.begin(), params.end(), values.begin());
-    // Before fromParams derives anything from them.
-    for (size_t i = 0; i < kCount; ++i) {
-      const ParamSpec& spec = M::kParams[i];
-      if (!(values[i] >= spec.min && values[i] <= spec.max)) {
-        fail(std::string(M::kName) + " parameter " + std::string(spec.name),
-             values[i],
-             rangeText(spec.min, spec.max));
-      }
-    }
-    return M::fromParams(values);
+    return makeChecked<M>(values);
   } else {
-    throw std::invalid_argument("unknown camera model '" + std::string(name) + "'");
+    failUnknownModel(name);
+  }
+}
+
+template <size_t I = 0>
+std::span<const ParamSpec> findSpecs(std::string_view name) {
+  if constexpr (I < std::variant_size_v<CameraModelVariant>) {
+    using M = std::variant_alternative_t<I, CameraModelVariant>;
+    return name == M::kName ? std::span<const ParamSpec>(M::kParams) : findSpecs<I + 1>(name);
+  } else {
+    failUnknownModel(name);
   }
 }
 
 }  // namespace
 
 Camera::Camera(const CameraModelVariant& model, int width, int height, double max_field_angle_rad)
-    : model_(model), width_(width), height_(height), max_field_angle_rad_(max_field_angle_rad) {
-  std::visit([](const auto& m) { checkParams(m); }, model_);
-  if (width < 1 || width > 65535) fail("image width", width, "[1, 65535]");
-  if (height < 1 || height > 65535) fail("image height", height, "[1, 65535]");
+    : model_(std::visit(
+          [](const auto& m) -> CameraModelVariant {
+            return makeChecked<std::decay_t<decltype(m)>>(m.params());
+          },
+          model)),
+      width_(width),
+      height_(height),
+      max_field_angle_rad_(max_field_angle_rad) {
+  const std::string sizes = rangeText(1, kMaxImageSize);
+  if (width < 1 || width > kMaxImageSize) fail("image width", width, sizes);
+  if (height < 1 || height > kMaxImageSize) fail("image height", height, sizes);
   if (!(max_field_angle_rad > 0 && max_field_angle_rad <= M_PI)) {
     fail("max_field_angle", max_field_angle_rad, "(0, pi] rad");
   }
 }
 
 double Camera::maxFieldAngle() const {
-  return std::visit([&](const auto& m) { return std::min(m.maxFieldAngle(), max_field_angle_rad_); },
-                    model_);
+  return std::visit(
+      [&](const auto& m) { return std::min(m.maxFieldAngle(), max_field_angle_rad_); }, model_);
 }
 
 std::string_view Camera::modelName() const {
@@ -89,7 +113,9 @@ std::string_view Camera::modelName() const {
 
 std::span<const ParamSpec> Camera::paramSpecs() const {
   return std::visit(
-      [](const auto& m) -> std::span<const ParamSpec> { return std::decay_t<decltype(m)>::kParams; },
+      [](const auto& m) -> std::span<const ParamSpec> {
+        return std::decay_t<decltype(m)>::kParams;
+      },
       model_);
 }
 
@@ -129,6 +155,10 @@ std::optional<ProjectionJacobian> Camera::jacobian(const Eigen::Vector3d& ray_in
   return std::visit(
       [&](const auto& m) { return m.jacobian(ray_in_cam.x(), ray_in_cam.y(), ray_in_cam.z()); },
       model_);
+}
+
+std::span<const ParamSpec> paramSpecsOf(std::string_view model_name) {
+  return findSpecs(model_name);
 }
 
 Camera makeCamera(std::string_view model_name,

@@ -22,14 +22,14 @@ using CameraModelVariant = std::variant<Pinhole, Fov, KannalaBrandt, UnifiedOmni
 /// A calibrated central camera. A value: cheap to copy, comparable, immutable.
 class Camera {
  public:
+  static constexpr int kMaxImageSize = 65535;  ///< px, of width and height.
+
+  /// Takes over the model's parameters; what a model derives from them is derived again.
   /// @param max_field_angle_rad  Rays at a larger angle to +z do not project and pixels that look
   ///   there have no ray, for lenses and mirrors that end before their model does. In (0, pi].
   /// Throws std::invalid_argument naming the parameter, its value and the allowed range if a
   /// parameter is outside the model's admissible range or not finite, or a size outside [1, 65535].
-  Camera(const CameraModelVariant& model,
-         int width,
-         int height,
-         double max_field_angle_rad = M_PI);
+  Camera(const CameraModelVariant& model, int width, int height, double max_field_angle_rad = M_PI);
 
   [[nodiscard]] const CameraModelVariant& model() const { return model_; }
   [[nodiscard]] int width() const { return width_; }
@@ -65,6 +65,9 @@ class Camera {
   int width_, height_;
   double max_field_angle_rad_;
 };
+
+/// Parameter table of a model by its kName. Throws std::invalid_argument for an unknown name.
+[[nodiscard]] std::span<const ParamSpec> paramSpecsOf(std::string_view model_name);
 
 /// Builds a camera from a model's name and its parameters in the order of its kParams.
 /// Throws std::invalid_argument for an unknown name, a wrong number of parameters or a bad value.

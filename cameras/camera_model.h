@@ -1,15 +1,17 @@
 #pragma once
 // The contract that every camera model keeps.
 //
-// A model is a small value: its parameters, plus what its constructor derives from them (for example
-// the angle at which a distortion polynomial stops rising). It maps rays to pixels and back:
+// A model is a small value: its parameters, plus what its constructor derives from them (for
+// example the angle at which a distortion polynomial stops rising). It maps rays to pixels and
+// back:
 //
 //   project   (x, y, z) in the camera frame, any positive scale  ->  pixel
 //   unproject (u, v)                                             ->  unit ray in the camera frame
 //
 // Camera frame: x right, y down, z forward. Pixel: integer coordinates are pixel centres.
-// Outside its domain a model answers `valid == false`; the values are then unspecified and must not be
-// read. valid implies finite. Whether a pixel lies inside the image is a separate question (camera.h).
+// Outside its domain a model answers `valid == false`; the values are then unspecified and must not
+// be read. valid implies finite. Whether a pixel lies inside the image is a separate question
+// (camera.h).
 
 #include <Eigen/Core>
 #include <array>
@@ -88,13 +90,8 @@ concept CameraModel = std::regular<M> &&
 
 /// Jacobian of (fx x s + cx, fy y s + cy), s = rho / r, for a rotationally symmetric rho(r, z),
 /// r = sqrt(x^2 + y^2). On the axis drho_dr equals s and the direction does not matter.
-[[nodiscard]] inline ProjectionJacobian radialJacobian(double fx,
-                                                       double fy,
-                                                       double x,
-                                                       double y,
-                                                       double s,
-                                                       double drho_dr,
-                                                       double drho_dz) {
+[[nodiscard]] inline ProjectionJacobian radialJacobian(
+    double fx, double fy, double x, double y, double s, double drho_dr, double drho_dz) {
   const double r = std::hypot(x, y);
   const double ex = r > 0 ? x / r : 1.0;
   const double ey = r > 0 ? y / r : 0.0;

@@ -3,8 +3,8 @@
 
 namespace dlsd {
 
-/// FoV (ATAN) model of Devernay and Faugeras, "Straight lines have to be straight" (2001), continued
-/// smoothly past 90 degrees:
+/// FoV (ATAN) model of Devernay and Faugeras, "Straight lines have to be straight" (2001),
+/// continued smoothly past 90 degrees:
 ///
 ///   alpha = atan2(2 tan(omega / 2) r, z),  r = sqrt(x^2 + y^2),  r_d = alpha / omega
 ///   (u, v) = (fx, fy) * r_d * (x, y) / r + (cx, cy)
@@ -12,8 +12,8 @@ namespace dlsd {
 /// For z > 0 this is the textbook form r_d = atan(2 tan(omega / 2) r / z) / omega. omega = 0 is the
 /// pinhole, to which the model converges.
 ///
-/// Domain: alpha < pi, that is every ray but -z; pixels with r_d omega < pi. For omega < kPinholeOmega
-/// (relative difference to the limit below 1e-19): z > 0, every pixel.
+/// Domain: alpha < pi, that is every ray but -z; pixels with r_d omega < pi. For omega <
+/// kPinholeOmega (relative difference to the limit below 1e-19): z > 0, every pixel.
 struct Fov {
   static constexpr std::string_view kName = "fov";
   static constexpr double kPinholeOmega = 1e-9;

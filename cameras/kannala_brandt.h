@@ -8,13 +8,14 @@ namespace dlsd {
 
 /// Kannala-Brandt fisheye with four coefficients, as OpenCV's `fisheye` and Kalibr's `equidistant`:
 ///
-///   theta = atan2(sqrt(x^2 + y^2), z),  d(theta) = theta (1 + k1 theta^2 + k2 theta^4 + k3 theta^6 + k4 theta^8)
-///   (u, v) = (fx, fy) * d(theta) * (x, y) / sqrt(x^2 + y^2) + (cx, cy)
+///   theta = atan2(sqrt(x^2 + y^2), z),  d(theta) = theta (1 + k1 theta^2 + k2 theta^4 + k3 theta^6
+///   + k4 theta^8) (u, v) = (fx, fy) * d(theta) * (x, y) / sqrt(x^2 + y^2) + (cx, cy)
 ///
-/// Domain: theta < max_theta, where max_theta is the smallest positive sign change of d'(theta), or pi
-/// if there is none below pi; pixels of radius r_d < d(max_theta). Solved once in fromParams.
-/// The inverse is a bracketed Newton iteration on the monotone range, run to the last bits.
-/// Source: Kannala and Brandt, "A generic camera model ..." (PAMI 2006), radial part only.
+/// Domain: theta < max_theta, where max_theta is the smallest positive sign change of d'(theta), or
+/// pi if there is none below pi; pixels of radius r_d < d(max_theta). Solved once in fromParams.
+/// The inverse is a Newton iteration inside a bracket that always holds the solution, run to the
+/// last bits: it cannot end anywhere else, so no residual has to be judged. Source: Kannala and
+/// Brandt, "A generic camera model ..." (PAMI 2006), radial part only.
 struct KannalaBrandt {
   static constexpr std::string_view kName = "kannala_brandt";
   static constexpr std::array<ParamSpec, 8> kParams{{
@@ -81,22 +82,20 @@ struct KannalaBrandt {
   template <class T>
   [[nodiscard]] T undistort(T r_d) const {
     T lo = 0, hi = T(max_theta);
-    T theta = std::min(r_d, hi / 2 + r_d / 2);
-    if (!(theta < hi)) theta = hi / 2;
-    // Each step halves the bracket or is a Newton step inside it; 100 steps bound the worst fold.
-    for (int i = 0; i < 100; ++i) {
+    T theta = r_d < hi / 2 ? r_d : hi / 2;
+    T last_step = hi;
+    // Each step at least halves the bracket or the step before the last: 200 bound the worst fold.
+    for (int i = 0; i < 200; ++i) {
       const T f = distort(theta) - r_d;
       if (f == T(0)) return theta;
-      if (f < T(0)) {
-        lo = theta;
-      } else {
-        hi = theta;
-      }
+      (f < T(0) ? lo : hi) = theta;
       T next = theta - f / distortSlope(theta);
-      if (!(next > lo && next < hi)) next = lo + (hi - lo) / 2;
-      const T step = std::abs(next - theta);
+      if (!(next > lo && next < hi && std::abs(next - theta) <= last_step / 2)) {
+        next = lo + (hi - lo) / 2;
+      }
+      last_step = std::abs(next - theta);
       theta = next;
-      if (step <= std::numeric_limits<T>::epsilon() * theta) break;
+      if (last_step <= std::numeric_limits<T>::epsilon() / 2 * theta) break;
     }
     return theta;
   }

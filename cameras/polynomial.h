@@ -13,8 +13,8 @@ namespace dlsd {
   return y;
 }
 
-/// All x in (lo, hi) at which the polynomial changes sign, ascending. Roots are isolated by those of
-/// the derivative, recursively, and bisected to the last bit, so none is missed and vanishing
+/// All x in (lo, hi) at which the polynomial changes sign, ascending. Roots are isolated by those
+/// of the derivative, recursively, and bisected to the last bit, so none is missed and vanishing
 /// leading or inner coefficients need no special case. Roots of even order are not sign changes.
 [[nodiscard]] inline std::vector<double> signChanges(std::span<const double> c,
                                                      double lo,

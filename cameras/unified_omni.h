@@ -3,14 +3,18 @@
 
 namespace dlsd {
 
-/// Unified omnidirectional model (Geyer and Daniilidis 2000; Barreto 2001; Mei and Rives 2007 without
-/// their distortion), Kalibr's `omni` with `none`:
+/// Unified omnidirectional model (Geyer and Daniilidis 2000; Barreto 2001; Mei and Rives 2007
+/// without their distortion), Kalibr's `omni` with `none`:
 ///
 ///   d = |(x, y, z)|,  (u, v) = (fx, fy) * (x, y) / (z + xi d) + (cx, cy)
 ///
-/// Domain (w = min(xi, 1 / xi)): rays with z > -w d. For xi <= 1 every pixel has a ray; for xi > 1 the
-/// image folds at m^2 = 1 / (xi^2 - 1), m = ((u - cx) / fx, (v - cy) / fy), and pixels up to there,
-/// m^2 <= 1 / (xi^2 - 1), have one.
+/// Domain: for xi <= 1 rays with z > -xi d, and every pixel. For xi > 1 the image folds where
+/// z = -d / xi: rays with z > -d / xi, and pixels up to the fold, m^2 <= 1 / (xi^2 - 1) with
+/// m = ((u - cx) / fx, (v - cy) / fy). xi = 0 is the pinhole.
+///
+/// Behind the camera z + xi d cancels, so there it is taken as
+/// (xi^2 r^2 + (xi^2 - 1) z^2) / (xi d - z), r^2 = x^2 + y^2, which for xi >= 1 has no cancellation
+/// and for xi < 1 only what the domain's bound brings with it.
 struct UnifiedOmni {
   static constexpr std::string_view kName = "omni";
   static constexpr std::array<ParamSpec, 5> kParams{{
@@ -31,13 +35,13 @@ struct UnifiedOmni {
 
   template <class T>
   [[nodiscard]] Pixel<T> project(T x, T y, T z) const {
-    const T norm2 = x * x + y * y + z * z;
-    const T d = std::sqrt(norm2);
-    const T w = T(xi > 1 ? 1 / xi : xi);
-    const T denom = z + T(xi) * d;
+    const T r2 = x * x + y * y;
+    const T norm2 = r2 + z * z;
+    const T denom = denominator(r2, z, std::sqrt(norm2));
     const T u = T(fx) * (x / denom) + T(cx);
     const T v = T(fy) * (y / denom) + T(cy);
-    return {u, v, z > -w * d && norm2InRange(norm2) && pixelInRange(u, v)};
+    const bool before_fold = z >= T(0) || xi <= 1 || r2 > T((xi - 1) * (xi + 1)) * (z * z);
+    return {u, v, denom > T(0) && before_fold && norm2InRange(norm2) && pixelInRange(u, v)};
   }
 
   template <class T>
@@ -54,14 +58,27 @@ struct UnifiedOmni {
   }
 
   [[nodiscard]] ProjectionJacobian jacobian(double x, double y, double z) const {
-    const double r = std::hypot(x, y);
-    const double d = std::hypot(r, z);
-    const double denom = z + xi * d;
-    const double g = (1 + xi * z / d) / (denom * denom);
-    return radialJacobian(fx, fy, x, y, 1 / denom, z * g, -r * g);
+    const double r2 = x * x + y * y;
+    const double d = std::sqrt(r2 + z * z);
+    const double denom = denominator(r2, z, d);
+    // d + xi z vanishes at the fold; behind the camera without cancellation, as the denominator.
+    const double slope = z >= 0 ? d + xi * z : (r2 - (xi - 1) * (xi + 1) * z * z) / (d - xi * z);
+    const double g = slope / (d * denom * denom);
+    return radialJacobian(fx, fy, x, y, 1 / denom, z * g, -std::sqrt(r2) * g);
   }
 
-  [[nodiscard]] double maxFieldAngle() const { return std::acos(-(xi > 1 ? 1 / xi : xi)); }
+  [[nodiscard]] double maxFieldAngle() const {
+    return xi > 1 ? std::atan2(std::sqrt((xi - 1) * (xi + 1)), -1.0)
+                  : std::atan2(std::sqrt((1 - xi) * (1 + xi)), -xi);
+  }
+
+ private:
+  /// z + xi d.
+  template <class T>
+  [[nodiscard]] T denominator(T r2, T z, T d) const {
+    return z >= T(0) ? z + T(xi) * d
+                     : (T(xi * xi) * r2 + T((xi - 1) * (xi + 1)) * (z * z)) / (T(xi) * d - z);
+  }
 };
 static_assert(CameraModel<UnifiedOmni>);
 

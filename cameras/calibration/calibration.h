@@ -14,15 +14,16 @@ struct NamedCamera {
 };
 
 /// All cameras of a calibration file, in file order.
-/// Throws InputError (files.h) with file, key, value and allowed range for anything missing, unknown,
-/// truncated, ambiguous or out of range; nothing is guessed.
+/// Throws InputError (files.h) with file, key, value and allowed range for anything missing,
+/// unknown, truncated, ambiguous or out of range; nothing is guessed.
 [[nodiscard]] std::vector<NamedCamera> loadCameras(const std::string& path);
 
 /// One camera: "file.yaml" (the file must hold exactly one) or "file.yaml:cam1".
 [[nodiscard]] Camera loadCamera(const std::string& path_or_path_and_name);
 
-/// Kalibr camchain text; exact: reading it back gives cameras that compare equal. A limit of the field
-/// angle is written as our extension `max_field_angle` (rad), with a comment that marks it as ours.
+/// Kalibr camchain text; exact: reading it back gives cameras that compare equal. A limit of the
+/// field angle is written as our extension `max_field_angle` (rad), with a comment that marks it as
+/// ours.
 [[nodiscard]] std::string kalibrYaml(const std::vector<NamedCamera>& cameras);
 
 /// Writes kalibrYaml atomically.

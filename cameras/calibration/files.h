@@ -1,6 +1,6 @@
 #pragma once
-// Files and their errors, for every module that reads or writes one. The command line turns InputError
-// and std::invalid_argument into exit code 2, SystemError into 3.
+// Files and their errors, for every module that reads or writes one. The command line turns
+// InputError and std::invalid_argument into exit code 2, SystemError into 3.
 
 #include <stdexcept>
 #include <string>
@@ -8,8 +8,8 @@
 
 namespace dlsd {
 
-/// The user gave something that can't be used: the message is one sentence that names the file, key,
-/// value and what is allowed.
+/// The user gave something that can't be used: the message is one sentence that names the file,
+/// key, value and what is allowed.
 struct InputError : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
@@ -22,11 +22,12 @@ struct SystemError : std::runtime_error {
 /// Whole content of a file. Throws InputError if it does not exist, is a folder or can't be read.
 [[nodiscard]] std::string readFile(const std::string& path);
 
-/// Writes to a temporary file in the same folder and renames it, so that `path` is either absent, old
-/// or complete. Parent folders must exist. Throws SystemError naming the path and the reason.
+/// Writes to a temporary file in the same folder and renames it, so that `path` is either absent,
+/// old or complete. Parent folders must exist. Throws SystemError naming the path and the reason.
 void writeFileAtomically(const std::string& path, std::string_view content);
 
-/// Creates a folder and its parents. Throws SystemError if that fails (a file stands there, no permission).
+/// Creates a folder and its parents. Throws SystemError if that fails (a file stands there, no
+/// permission).
 void makeFolders(const std::string& path);
 
 }  // namespace dlsd
