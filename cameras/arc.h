@@ -54,15 +54,15 @@ struct ImageSpan {
 /// The pieces of an arc that the camera images, in order. Cut at the image border (kBorder) and at
 /// the bound of the camera's domain (kRim), each located to 1e-12 of the arc.
 ///
-/// Guarantee: every piece and every gap between pieces that is longer than 0.1 degrees on the arc
+/// Guarantee: every piece, and every gap between pieces, that is longer than 0.1 degrees on the arc
 /// or 2 px in the image is found. Shorter ones may be missed; then the neighbours are reported as
-/// if it were not there. A stretch of the arc is skipped without a closer look only if it is
-/// outside the cone of all image rays, or if its ends are further from image border and domain
-/// bound than the stretch is long: on the sphere exactly, in the image with the larger of the
-/// scales (px per rad, largest singular value of the projection's Jacobian) at its ends times 1.5.
-/// That bound holds for cameras whose scale does not rise above 1.5 times its larger end value
-/// inside a stretch of 4 degrees, as for all admissible pinhole and omni cameras, FoV with omega >=
-/// 0.2, and Kannala-Brandt lenses that turn by less than 50 % in 4 degrees.
+/// if it were not there. A stretch of the arc is passed over only where nothing can happen: outside
+/// the cone of all image rays, or if its ends are further from the domain's bound (on the sphere,
+/// exactly) and from the image border than the stretch is long. In the image the length is taken
+/// with 1.5 times the larger scale (px per rad, largest singular value of the projection's
+/// Jacobian) at its ends, so it takes a camera whose scale does not rise and fall again by more
+/// than half within 4 degrees, as is true of real lenses and mirrors; counter-examples are FoV with
+/// omega < 0.05 at 90 degrees and the last degrees before -z.
 [[nodiscard]] std::vector<ImageSpan> imageSpans(const Camera& camera, const Arc& arc);
 
 /// Points on the image of the piece [t0, t1] of an arc, first and last included, joined by straight
