@@ -1,12 +1,14 @@
 #pragma once
-// Detection of straight 3D lines in the distorted image of a calibrated camera, without rectification.
+// Detection of straight 3D lines in the distorted image of a calibrated camera, without
+// rectification.
 //
 //   dlsd::Detector detector(camera);
 //   for (const dlsd::DetectedLine& line : detector.detect({pixels, width, height, 1, stride})) ...
 //
-// Method: edge chains -> convex polygonal chains -> plane through the optical centre in closed form ->
-// reprojection test within rho px (Zuniga-Noel et al., "D-LSD", CAIP 2021). DetectorOptions::paper()
-// is the paper's algorithm; the default goes beyond it where measurement showed a gain.
+// Method: edge chains -> convex polygonal chains -> plane through the optical centre in closed form
+// -> reprojection test within rho px (Zuniga-Noel et al., "D-LSD", CAIP 2021).
+// DetectorOptions::paper() is the paper's algorithm; the default goes beyond it where measurement
+// showed a gain.
 
 #include <Eigen/Core>
 #include <memory>
@@ -22,13 +24,13 @@ struct DetectorOptions;  // detector/options.h
 
 /// A straight 3D line seen in the image.
 struct DetectedLine {
-  Arc arc;                                    ///< Fitted plane and end rays, camera frame.
-  Eigen::Vector2d from_px, to_px;             ///< Projections of arc.from and arc.to.
-  Eigen::Matrix3d normal_cov;                 ///< Covariance of arc.normal (rank 2), from the residuals.
-  double rms_px = 0, max_px = 0;              ///< Reprojection residuals (paper's Eq. 8) of the edge pixels.
-  double length_px = 0;                       ///< Length along the image curve.
-  double score = 0;                           ///< -log10 of the number of false alarms; larger is better.
-  int polarity = 1;                           ///< +1: brighter on the side arc.normal points to, else -1.
+  Arc arc;                         ///< Fitted plane and end rays, camera frame.
+  Eigen::Vector2d from_px, to_px;  ///< Projections of arc.from and arc.to.
+  Eigen::Matrix3d normal_cov;      ///< Covariance of arc.normal (rank 2), from the residuals.
+  double rms_px = 0, max_px = 0;   ///< Reprojection residuals (paper's Eq. 8) of the edge pixels.
+  double length_px = 0;            ///< Length along the image curve.
+  double score = 0;                ///< -log10 of the number of false alarms; larger is better.
+  int polarity = 1;                ///< +1: brighter on the side arc.normal points to, else -1.
 };
 
 /// Seconds spent in each step of the last detect() call.
@@ -36,8 +38,8 @@ struct StageTimes {
   double gradient = 0, anchors = 0, linking = 0, chains = 0, planes = 0, validation = 0, total = 0;
 };
 
-/// Builds its tables once; detect() then reuses its buffers. Not for use by two threads at once: take
-/// one detector per thread.
+/// Builds its tables once; detect() then reuses its buffers. Not for use by two threads at once:
+/// take one detector per thread.
 class Detector {
  public:
   explicit Detector(const Camera& camera);
@@ -49,7 +51,8 @@ class Detector {
 
   /// Lines in descending score, ties by position: the same output for the same image, always.
   /// The reference is valid until the next call. Throws std::invalid_argument if the view's size is
-  /// not the camera's, or the view is malformed (null data, channels not 1, 3, 4, stride too small).
+  /// not the camera's, or the view is malformed (null data, channels not 1, 3, 4, stride too
+  /// small).
   [[nodiscard]] const std::vector<DetectedLine>& detect(const ImageView& image);
 
   [[nodiscard]] const StageTimes& times() const;

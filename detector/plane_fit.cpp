@@ -1,0 +1,128 @@
+#include "detector/plane_fit.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace dlsd {
+namespace {
+
+/// Columns: axis and two unit vectors perpendicular to it.
+Eigen::Matrix3d frameAround(const Eigen::Vector3d& axis) {
+  int smallest = 0;
+  axis.cwiseAbs().minCoeff(&smallest);
+  const Eigen::Vector3d a = axis.cross(Eigen::Vector3d::Unit(smallest)).normalized();
+  Eigen::Matrix3d frame;
+  frame << axis, a, axis.cross(a);
+  return frame;
+}
+
+/// Fit in a frame whose axis 0 lies in or near the plane and along which M is large.
+///
+/// With M = [a k'; k B] and n = (n0, v), the rows of (M - lambda) n = 0 give n0 = -k.v / (a -
+/// lambda) and (S(lambda) - lambda) v = 0, S = B - k k' / (a - lambda). S is 2x2, so its smaller
+/// eigenvalue mu has a closed form, and lambda is the root of mu(lambda) = lambda. For rays near a
+/// plane k.v is as small as their residuals and mu hardly depends on lambda: the first step from 0
+/// is exact to rounding, further ones (Newton) serve rays far from any plane. Small eigenvalues
+/// keep their relative accuracy, which the roots of the cubic characteristic polynomial would not.
+std::optional<PlaneFit> fitInFrame(const Eigen::Matrix3d& M,
+                                   const Eigen::Matrix3d& frame,
+                                   double min_eigenvalue_ratio) {
+  const double a = M(0, 0), k1 = M(0, 1), k2 = M(0, 2);
+  double lambda = 0, larger = 0;
+  Eigen::Vector3d n;
+  for (int iteration = 0; iteration < 50; ++iteration) {
+    const double d = a - lambda;
+    if (!(d > 0)) return std::nullopt;
+    const double s11 = M(1, 1) - k1 * k1 / d;
+    const double s12 = M(1, 2) - k1 * k2 / d;
+    const double s22 = M(2, 2) - k2 * k2 / d;
+    const double half_sum = (s11 + s22) / 2, half_difference = (s11 - s22) / 2;
+    const double radius = std::hypot(half_difference, s12);
+    const double mu = half_sum - radius;
+    larger = half_sum + radius;
+    // Eigenvector of mu, from the row that does not cancel.
+    double v1 = -s12, v2 = half_difference + radius;
+    if (half_difference < 0) {
+      v1 = radius - half_difference;
+      v2 = -s12;
+    }
+    const double length = std::hypot(v1, v2);
+    if (!(length > 0)) return std::nullopt;
+    v1 /= length;
+    v2 /= length;
+    const double n0 = -(k1 * v1 + k2 * v2) / d;
+    n = {n0, v1, v2};
+    const double step = (mu - lambda) / (1 + n0 * n0);
+    const double previous = lambda;
+    lambda = std::max(0.0, lambda + step);
+    const double tolerance = 4 * std::numeric_limits<double>::epsilon() * larger;
+    if (!(std::abs(lambda - previous) > tolerance)) break;
+  }
+  if (!(larger > min_eigenvalue_ratio * a) || !std::isfinite(larger)) return std::nullopt;
+
+  n.normalize();
+  // In-plane directions: axis 0 as far as it lies in the plane, and across.
+  Eigen::Vector3d along = Eigen::Vector3d::UnitX() - n.x() * n;
+  if (!(along.squaredNorm() > 1e-6)) return std::nullopt;
+  along.normalize();
+  Eigen::Matrix<double, 3, 2> basis;
+  basis << along, n.cross(along);
+  const Eigen::Matrix2d in_plane = basis.transpose() * M * basis;
+  const double determinant = in_plane(0, 0) * in_plane(1, 1) - in_plane(0, 1) * in_plane(1, 0);
+  if (!(determinant > 0)) return std::nullopt;
+  Eigen::Matrix2d inverse;
+  inverse << in_plane(1, 1), -in_plane(0, 1), -in_plane(1, 0), in_plane(0, 0);
+  inverse /= determinant;
+
+  PlaneFit fit;
+  fit.normal = frame * n;
+  for (int i = 0; i < 3; ++i) {
+    if (fit.normal[i] == 0) continue;
+    if (fit.normal[i] < 0) fit.normal = -fit.normal;
+    break;
+  }
+  fit.squared_residuals = lambda;
+  const Eigen::Matrix<double, 3, 2> basis_out = frame * basis;
+  fit.inverse_in_plane = basis_out * inverse * basis_out.transpose();
+  return fit;
+}
+
+}  // namespace
+
+std::optional<PlaneFit> fitPlane(const RayMoments& moments) {
+  const Eigen::Matrix3d M = moments.matrix();
+  const double trace = M.trace();
+  if (!(trace > 0) || !std::isfinite(trace)) return std::nullopt;
+  // Two steps of the power method from the largest column: within the plane, near the rays.
+  int column = 0;
+  M.diagonal().maxCoeff(&column);
+  Eigen::Vector3d axis = M.col(column) / trace;
+  axis = (M * axis) / trace;
+  if (!(axis.norm() > 0)) return std::nullopt;
+  const Eigen::Matrix3d frame = frameAround(axis.normalized());
+  return fitInFrame(frame.transpose() * M * frame, frame, 1e-13);
+}
+
+std::optional<PlaneFit> fitPlane(std::span<const Eigen::Vector3d> rays) {
+  if (rays.size() < 2) return std::nullopt;
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+  for (const Eigen::Vector3d& ray : rays) mean += ray;
+  // Rays all around have no mean; any of them is then as good an axis.
+  const double count = static_cast<double>(rays.size());
+  const Eigen::Vector3d axis = mean.norm() > 0.3 * count ? mean.normalized() : rays.front();
+  const Eigen::Matrix3d frame = frameAround(axis);
+  Eigen::Matrix3d M = Eigen::Matrix3d::Zero();
+  for (const Eigen::Vector3d& ray : rays) {
+    // Perpendicular components from the difference, which is exact for rays near the axis.
+    const Eigen::Vector3d offset = ray - axis;
+    const Eigen::Vector3d local(
+        frame.col(0).dot(ray), frame.col(1).dot(offset), frame.col(2).dot(offset));
+    M += local * local.transpose();
+  }
+  if (!std::isfinite(M.trace())) return std::nullopt;
+  return fitInFrame(M, frame, 1e-18);
+}
+
+}  // namespace dlsd
