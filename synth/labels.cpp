@@ -1,0 +1,507 @@
+#include "synth/labels.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <optional>
+
+namespace dlsd {
+namespace {
+
+/// A face "contains" an edge if both ends are this near to its plane (m): float rounding of
+/// vertices up to 16 m from the origin, with room. A plane that contains an edge meets a ray to it
+/// nowhere else, so such a face never hides it.
+constexpr double kInPlane = 5e-6;
+/// Directions of the same crossing computed in two ways agree to this, rad.
+constexpr double kSameDirection = 1e-9;
+constexpr double kContrastOffsetRad = 2e-4;
+constexpr int kContrastPoints = 11;
+constexpr int kWidthPoints = 17;
+
+/// An edge as an arc in the camera frame, ready for crossings.
+struct EdgeArc {
+  int edge;
+  Arc arc;
+  Eigen::Vector3d side;    ///< Unit, in the plane, a quarter turn from arc.from towards arc.to.
+  Eigen::Vector3d normal;  ///< arc.from x side.
+  Eigen::Vector3d middle;  ///< Unit direction to the middle of the arc.
+  double angle, cos_half, sin_half;
+  double nearest, farthest;  ///< Distances of the segment to the camera, m.
+
+  [[nodiscard]] Eigen::Vector3d at(double phi) const {
+    return std::cos(phi) * arc.from + std::sin(phi) * side;
+  }
+  [[nodiscard]] double phiOf(const Eigen::Vector3d& direction) const {
+    return std::atan2(direction.dot(side), direction.dot(arc.from));
+  }
+};
+
+/// The edges' ends in the camera frame.
+struct Segment {
+  Eigen::Vector3d from, to;
+  [[nodiscard]] double nearestDistance() const {
+    const Eigen::Vector3d d = to - from;
+    const double s = std::clamp(-from.dot(d) / d.squaredNorm(), 0.0, 1.0);
+    return (from + s * d).norm();
+  }
+};
+
+Segment segmentOf(const Edge& edge, const Pose& pose) {
+  return {pose.toCam(edge.from), pose.toCam(edge.to)};
+}
+
+std::optional<EdgeArc> edgeArc(const Scene& scene, const Pose& pose, int index) {
+  const Segment s = segmentOf(scene.edges[static_cast<size_t>(index)], pose);
+  const auto arc = arcBetween(s.from, s.to);
+  if (!arc) return std::nullopt;  // The line goes through the camera: it is seen as a point.
+  EdgeArc e;
+  e.edge = index;
+  e.arc = *arc;
+  e.normal = s.from.cross(s.to).normalized();
+  e.side = e.normal.cross(arc->from);
+  e.angle = arc->angle();
+  e.middle = e.at(e.angle / 2);
+  e.cos_half = std::cos(e.angle / 2);
+  e.sin_half = std::sin(e.angle / 2);
+  e.nearest = s.nearestDistance();
+  e.farthest = std::max(s.from.norm(), s.to.norm());
+  return e;
+}
+
+/// Where the segment of an arc is met by the ray at angle phi, as a fraction of the segment.
+double fractionAt(const EdgeArc& e, const Segment& s, double phi) {
+  const Eigen::Vector2d a(s.from.dot(e.arc.from), s.from.dot(e.side));
+  const Eigen::Vector2d b(s.to.dot(e.arc.from), s.to.dot(e.side));
+  const Eigen::Vector2d d(std::cos(phi), std::sin(phi));
+  const auto cross = [](const Eigen::Vector2d& p, const Eigen::Vector2d& q) {
+    return p.x() * q.y() - p.y() * q.x();
+  };
+  return std::clamp(-cross(a, d) / cross(b - a, d), 0.0, 1.0);
+}
+
+/// Visibility events on one arc: angles at which it may change.
+class Events {
+ public:
+  explicit Events(const EdgeArc& arc) : arc_(arc) {}
+
+  void addDirection(const Eigen::Vector3d& direction) { addPhi(arc_.phiOf(direction)); }
+  void addPhi(double phi) {
+    if (phi > -kSameDirection && phi < arc_.angle + kSameDirection) phis_.push_back(phi);
+  }
+
+  /// Crossing with the arc of an outline.
+  void addCrossing(const EdgeArc& other) {
+    const double a0 = other.normal.dot(arc_.arc.from), a1 = other.normal.dot(arc_.arc.to);
+    const double b0 = arc_.normal.dot(other.arc.from), b1 = arc_.normal.dot(other.arc.to);
+    constexpr double kFlat = 1e-7;
+    if (std::max(std::abs(a0), std::abs(a1)) < kFlat ||
+        std::max(std::abs(b0), std::abs(b1)) < kFlat) {
+      // Both in one plane through the camera: they overlap or not, the ends say it all.
+      addDirection(other.arc.from);
+      addDirection(other.arc.to);
+      return;
+    }
+    const auto sameSide = [](double p, double q) {
+      return p * q > 0 && std::min(std::abs(p), std::abs(q)) > kSameDirection;
+    };
+    if (sameSide(a0, a1) || sameSide(b0, b1)) return;
+    Eigen::Vector3d d = arc_.normal.cross(other.normal);
+    if (d.dot(arc_.middle) < 0) d = -d;
+    if (d.dot(other.middle) < 0) return;  // They meet on opposite sides of the sphere.
+    addDirection(d);
+  }
+
+  void addSphere(const Eigen::Vector3d& centre, double radius, const Segment& segment) {
+    const double distance = centre.norm();
+    if (distance > radius) {
+      const Eigen::Vector3d c = centre / distance;
+      const double x = arc_.arc.from.dot(c), y = arc_.side.dot(c);
+      const double sine = radius / distance;
+      const double ratio = std::sqrt((1 - sine) * (1 + sine)) / std::hypot(x, y);
+      if (ratio <= 1) {
+        const double at = std::atan2(y, x), half = std::acos(ratio);
+        addPhi(at - half);
+        addPhi(at + half);
+      }
+    }
+    // Where the edge itself goes into the sphere (a rod into its node).
+    const Eigen::Vector3d d = segment.to - segment.from, m = segment.from - centre;
+    const double a = d.squaredNorm(), b = m.dot(d), c = m.squaredNorm() - radius * radius;
+    const double disc = b * b - a * c;
+    if (disc < 0) return;
+    for (const double root : {std::sqrt(disc), -std::sqrt(disc)}) {
+      const double s = (-b + root) / a;
+      if (s > 0 && s < 1) addDirection(segment.from + s * d);
+    }
+  }
+
+  void addDisc(const Eigen::Vector3d& centre, const Eigen::Vector3d& normal, double radius) {
+    // The arc's plane meets the disc's plane in a line; the line meets the circle twice or never.
+    const Eigen::Vector3d across = arc_.normal - normal * normal.dot(arc_.normal);
+    const double across2 = across.squaredNorm();
+    if (across2 < 1e-24) return;
+    const Eigen::Vector3d foot = centre - across * (centre.dot(arc_.normal) / across2);
+    const double rest2 = radius * radius - (foot - centre).squaredNorm();
+    if (rest2 < 0) return;
+    const Eigen::Vector3d along = normal.cross(across).normalized() * std::sqrt(rest2);
+    addDirection(foot + along);
+    addDirection(foot - along);
+  }
+
+  /// Sorted angles inside (lo, hi), with both ends.
+  [[nodiscard]] std::vector<double> cuts(double lo, double hi) {
+    std::sort(phis_.begin(), phis_.end());
+    std::vector<double> out{lo};
+    for (const double phi : phis_) {
+      if (phi > out.back() + kSameDirection && phi < hi - kSameDirection) out.push_back(phi);
+    }
+    out.push_back(hi);
+    return out;
+  }
+
+ private:
+  const EdgeArc& arc_;
+  std::vector<double> phis_;
+};
+
+/// Answers which faces look at the camera, and whether something hides a point of an edge.
+class View {
+ public:
+  View(const Scene& scene, const Raycaster& raycaster, const Pose& pose)
+      : scene_(scene), raycaster_(raycaster), pose_(pose), height_(scene.faces.size()) {
+    for (size_t f = 0; f < scene.faces.size(); ++f) {
+      height_[f] = scene.faces[f].normal.dot(pose.position_in_world - scene.faces[f].origin);
+    }
+  }
+
+  [[nodiscard]] bool looksAtCamera(int face) const { return height(face) > 0; }
+
+  /// The edge may show: one of its faces looks at the camera. In the rounding of the plane both
+  /// count.
+  [[nodiscard]] bool mayShow(const Edge& edge) const {
+    switch (edge.source) {
+      case EdgeSource::kFaces:
+        return height(edge.face0) > -kInPlane || height(edge.face1) > -kInPlane;
+      case EdgeSource::kDecal:
+        return height(edge.face0) > 0;
+      case EdgeSource::kRodCentre:
+        return true;
+    }
+    return false;
+  }
+
+  /// The edge may hide others: its two faces look different ways.
+  [[nodiscard]] bool isOutline(const Edge& edge) const {
+    if (edge.source != EdgeSource::kFaces) return false;
+    const double h0 = height(edge.face0), h1 = height(edge.face1);
+    return std::min(h0, h1) < kInPlane && std::max(h0, h1) > -kInPlane;
+  }
+
+  [[nodiscard]] bool contains(int face, const Edge& edge) const {
+    const Face& f = scene_.faces[static_cast<size_t>(face)];
+    return std::abs(f.normal.dot(edge.from - f.origin)) < kInPlane &&
+           std::abs(f.normal.dot(edge.to - f.origin)) < kInPlane;
+  }
+
+  [[nodiscard]] bool hidden(const Edge& edge, const Eigen::Vector3d& point) const {
+    const Eigen::Vector3d d = point - pose_.position_in_world;
+    const double distance = d.norm();
+    const Eigen::Vector3f direction = (d / distance).cast<float>();
+    // Contact aside, nothing is nearer to an edge than about 1 mm: 1e-5 of the distance is less.
+    const auto end = static_cast<float>(distance * (1 - 1e-5));
+    float begin = 0;
+    for (;;) {
+      const Hit hit = raycaster_.cast(pose_.position_in_world.cast<float>(), direction, begin, end);
+      if (hit.kind == HitKind::kNothing) return false;
+      if (hit.kind != HitKind::kFace || !mayLookThrough(hit.index, edge)) return true;
+      begin = std::max(hit.distance * (1 + 1e-6F),
+                       std::nextafter(hit.distance, std::numeric_limits<float>::infinity()));
+      if (!(begin < end)) return false;
+    }
+  }
+
+ private:
+  [[nodiscard]] double height(int face) const { return height_[static_cast<size_t>(face)]; }
+
+  [[nodiscard]] bool mayLookThrough(int face, const Edge& edge) const {
+    if (edge.source == EdgeSource::kRodCentre) {
+      const Rod& rod = scene_.rods[static_cast<size_t>(edge.rod)];
+      if (face >= rod.first_face && face < rod.first_face + rod.face_count) return true;
+    }
+    return contains(face, edge);
+  }
+
+  const Scene& scene_;
+  const Raycaster& raycaster_;
+  const Pose& pose_;
+  std::vector<double> height_;  ///< Of the camera over each face's plane, m.
+};
+
+/// Largest angle to +z of a ray of the image: on its border, or the whole domain if the border is
+/// partly outside of it.
+double imageFieldAngle(const Camera& camera) {
+  double largest = 0;
+  constexpr int kSteps = 256;
+  for (int k = 0; k <= kSteps; ++k) {
+    const double x = -0.5 + camera.width() * static_cast<double>(k) / kSteps;
+    const double y = -0.5 + camera.height() * static_cast<double>(k) / kSteps;
+    for (const Eigen::Vector2d& p : {Eigen::Vector2d(x, -0.5),
+                                     Eigen::Vector2d(x, camera.height() - 0.5),
+                                     Eigen::Vector2d(-0.5, y),
+                                     Eigen::Vector2d(camera.width() - 0.5, y)}) {
+      const auto ray = camera.unproject(p);
+      if (!ray) return camera.maxFieldAngle();
+      largest = std::max(largest, std::atan2(std::hypot(ray->x(), ray->y()), ray->z()));
+    }
+  }
+  return std::min(camera.maxFieldAngle(), largest + 0.02);
+}
+
+EndKind endKind(ImageEnd end) {
+  switch (end) {
+    case ImageEnd::kArcEnd:
+      return EndKind::kVertex;
+    case ImageEnd::kBorder:
+      return EndKind::kBorder;
+    case ImageEnd::kRim:
+      return EndKind::kRim;
+  }
+  return EndKind::kVertex;
+}
+
+/// To 1e-6 px, a thousandth of the labels' tolerance: files get half as long.
+double roundPixel(double x) {
+  return std::round(x * 1e6) / 1e6;
+}
+
+double curveLength(const std::vector<Eigen::Vector2d>& points) {
+  double length = 0;
+  for (size_t i = 1; i < points.size(); ++i) length += (points[i] - points[i - 1]).norm();
+  return length;
+}
+
+/// Per rod: labelled by its centre line in this view?
+std::vector<char> findWires(const Scene& scene, const Camera& camera, const Pose& pose) {
+  std::vector<char> wires(scene.rods.size(), 0);
+  for (size_t i = 0; i < scene.edges.size(); ++i) {
+    if (scene.edges[i].source != EdgeSource::kRodCentre) continue;
+    const auto e = edgeArc(scene, pose, static_cast<int>(i));
+    if (!e) continue;
+    const Segment segment = segmentOf(scene.edges[i], pose);
+    const auto rod = static_cast<size_t>(scene.edges[i].rod);
+    double widest = -1;
+    for (const ImageSpan& span : imageSpans(camera, e->arc)) {
+      for (int k = 0; k < kWidthPoints; ++k) {
+        const double t = span.t0 + (span.t1 - span.t0) * k / (kWidthPoints - 1);
+        const double s = fractionAt(*e, segment, t * e->angle);
+        const Eigen::Vector3d point = segment.from + s * (segment.to - segment.from);
+        const auto J = camera.jacobian(point);
+        if (!J) continue;
+        const Eigen::Vector2d along = (*J * (segment.to - segment.from)).normalized();
+        const Eigen::Vector2d across = *J * (2 * scene.rods[rod].radius * e->normal);
+        widest = std::max(widest, std::abs(along.x() * across.y() - along.y() * across.x()));
+      }
+    }
+    wires[rod] = widest >= 0 && widest < kThickRodPx ? 1 : 0;
+  }
+  return wires;
+}
+
+}  // namespace
+
+std::vector<EdgeSpan> visibleSpans(const Scene& scene,
+                                   const Raycaster& raycaster,
+                                   const Camera& camera,
+                                   const Pose& pose) {
+  const View view(scene, raycaster, pose);
+  const double field = imageFieldAngle(camera);
+  struct Candidate {
+    EdgeArc arc;
+    std::vector<ImageSpan> imaged;
+  };
+  std::vector<Candidate> candidates;
+  std::vector<EdgeArc> outlines;
+  for (size_t i = 0; i < scene.edges.size(); ++i) {
+    const Edge& edge = scene.edges[i];
+    if (!view.mayShow(edge)) continue;
+    const auto arc = edgeArc(scene, pose, static_cast<int>(i));
+    if (!arc) continue;
+    const Eigen::Vector3d& m = arc->middle;
+    if (std::atan2(std::hypot(m.x(), m.y()), m.z()) - arc->angle / 2 > field) continue;
+    if (view.isOutline(edge)) outlines.push_back(*arc);
+    std::vector<ImageSpan> imaged = imageSpans(camera, arc->arc);
+    if (!imaged.empty()) candidates.push_back({*arc, std::move(imaged)});
+  }
+
+  std::vector<EdgeSpan> spans;
+  for (const Candidate& candidate : candidates) {
+    const EdgeArc& arc = candidate.arc;
+    const Edge& edge = scene.edges[static_cast<size_t>(arc.edge)];
+    const Segment segment = segmentOf(edge, pose);
+    Events events(arc);
+    for (const EdgeArc& outline : outlines) {
+      if (outline.nearest > arc.farthest || outline.edge == arc.edge) continue;
+      // Caps of the two arcs apart: angle between the middles > sum of the half angles.
+      const double cos_sum =
+          arc.cos_half * outline.cos_half - arc.sin_half * outline.sin_half - 1e-9;
+      if (arc.middle.dot(outline.middle) < cos_sum && arc.angle + outline.angle < 2 * M_PI)
+        continue;
+      events.addCrossing(outline);
+    }
+    for (const Sphere& sphere : scene.spheres) {
+      events.addSphere(
+          pose.toCam(sphere.centre.cast<double>()), static_cast<double>(sphere.radius), segment);
+    }
+    for (const Disc& disc : scene.discs) {
+      events.addDisc(pose.toCam(disc.centre.cast<double>()),
+                     pose.cam_from_world * disc.normal.cast<double>(),
+                     static_cast<double>(disc.radius));
+    }
+    for (const ImageSpan& imaged : candidate.imaged) {
+      const std::vector<double> cuts = events.cuts(imaged.t0 * arc.angle, imaged.t1 * arc.angle);
+      const size_t first = spans.size();
+      for (size_t k = 0; k + 1 < cuts.size(); ++k) {
+        const double s = fractionAt(arc, segment, (cuts[k] + cuts[k + 1]) / 2);
+        if (view.hidden(edge, edge.from + s * (edge.to - edge.from))) continue;
+        if (spans.size() > first && cuts[k] - spans.back().phi1 < kShortestSpanRad) {
+          spans.back().phi1 = cuts[k + 1];
+        } else {
+          spans.push_back({arc.edge, arc.arc, cuts[k], cuts[k + 1], {}, {}});
+        }
+      }
+      size_t kept = first;
+      for (size_t k = first; k < spans.size(); ++k) {
+        EdgeSpan span = std::move(spans[k]);
+        if (span.phi1 - span.phi0 < kShortestSpanRad) continue;
+        span.ends[0] = span.phi0 == cuts.front() ? endKind(imaged.end0) : EndKind::kOccluder;
+        span.ends[1] = span.phi1 == cuts.back() ? endKind(imaged.end1) : EndKind::kOccluder;
+        span.curve =
+            imageCurve(camera, arc.arc, span.phi0 / arc.angle, span.phi1 / arc.angle, 0.01);
+        if (span.curve.size() >= 2) spans[kept++] = std::move(span);
+      }
+      spans.resize(kept);
+    }
+  }
+  return spans;
+}
+
+Labels makeLabels(const Scene& scene,
+                  const Raycaster& raycaster,
+                  const Shader& shader,
+                  const Camera& camera,
+                  const Pose& pose,
+                  const SensorOptions& sensor,
+                  const std::vector<EdgeSpan>& spans) {
+  const View view(scene, raycaster, pose);
+  const std::vector<char> wires = findWires(scene, camera, pose);
+  const Eigen::Vector3f origin = pose.position_in_world.cast<float>();
+  const Eigen::Matrix3d world_from_cam = pose.cam_from_world.transpose();
+  struct Look {
+    double grey;
+    Hit hit;
+  };
+  const auto look = [&](const Eigen::Vector3d& ray_in_cam) -> Look {
+    const Eigen::Vector3d direction = (world_from_cam * ray_in_cam).normalized();
+    const Hit hit =
+        raycaster.cast(origin, direction.cast<float>(), 0, std::numeric_limits<float>::infinity());
+    const Seen seen = shader.shade(hit, pose.position_in_world, direction);
+    return {greyLevel(sensor, static_cast<double>(seen.radiance)), hit};
+  };
+
+  Labels labels;
+  struct VertexEnd {
+    Eigen::Vector3d vertex;
+    Eigen::Vector2d pixel;
+    int line;
+  };
+  std::vector<VertexEnd> vertex_ends;
+  for (const EdgeSpan& span : spans) {
+    const Edge& edge = scene.edges[static_cast<size_t>(span.edge)];
+    const bool is_wire = edge.source == EdgeSource::kRodCentre;
+    if (edge.rod >= 0 && (wires[static_cast<size_t>(edge.rod)] != 0) != is_wire) continue;
+    const auto arc = edgeArc(scene, pose, span.edge);
+    if (!arc) continue;
+    const Segment segment = segmentOf(edge, pose);
+    const auto pointAt = [&](double phi) -> Eigen::Vector3d {
+      return segment.from + fractionAt(*arc, segment, phi) * (segment.to - segment.from);
+    };
+
+    LabelLine line;
+    line.id = static_cast<int>(labels.lines.size());
+    line.edge = span.edge;
+    line.carrier = edge.carrier;
+    line.points_in_cam = {pointAt(span.phi0), pointAt(span.phi1)};
+    line.normal = canonicalNormal(arc->normal);
+    line.ends = span.ends;
+    line.angle_rad = span.phi1 - span.phi0;
+    for (const Eigen::Vector2d& p : span.curve) {
+      line.points.emplace_back(roundPixel(p.x()), roundPixel(p.y()));
+    }
+    line.length_px = curveLength(span.curve);
+
+    int continuous = 0;
+    line.contrast_min = std::numeric_limits<double>::infinity();
+    for (int k = 0; k < kContrastPoints; ++k) {
+      const double phi = span.phi0 + line.angle_rad * (k + 0.5) / kContrastPoints;
+      const Eigen::Vector3d ray = arc->at(phi);
+      double offset = kContrastOffsetRad;
+      if (is_wire) {
+        const double sine = scene.rods[static_cast<size_t>(edge.rod)].radius / pointAt(phi).norm();
+        offset += std::asin(std::min(1.0, sine));
+      }
+      const Look left = look(ray + std::tan(offset) * arc->normal);
+      const Look right = look(ray - std::tan(offset) * arc->normal);
+      const double contrast = is_wire ? std::abs(look(ray).grey - (left.grey + right.grey) / 2)
+                                      : std::abs(left.grey - right.grey);
+      line.contrast += contrast / kContrastPoints;
+      line.contrast_min = std::min(line.contrast_min, contrast);
+      const auto containsEdge = [&](const Hit& hit) {
+        return hit.kind == HitKind::kFace && view.contains(hit.index, edge);
+      };
+      continuous += containsEdge(left.hit) && containsEdge(right.hit) ? 1 : 0;
+    }
+    if (is_wire) {
+      line.kind = LineKind::kWire;
+    } else if (edge.source == EdgeSource::kDecal) {
+      line.kind = LineKind::kMaterial;
+    } else {
+      line.kind = 2 * continuous > kContrastPoints ? LineKind::kCrease : LineKind::kSilhouette;
+    }
+    if (line.ends[0] == EndKind::kVertex) {
+      vertex_ends.push_back({edge.from, line.points.front(), line.id});
+    }
+    if (line.ends[1] == EndKind::kVertex) {
+      vertex_ends.push_back({edge.to, line.points.back(), line.id});
+    }
+    labels.lines.push_back(std::move(line));
+  }
+
+  // Ends at one point of space meet in a junction.
+  constexpr double kSameVertex = 1e-5;
+  std::sort(vertex_ends.begin(), vertex_ends.end(), [](const VertexEnd& a, const VertexEnd& b) {
+    return a.vertex.x() != b.vertex.x() ? a.vertex.x() < b.vertex.x() : a.line < b.line;
+  });
+  std::vector<char> used(vertex_ends.size(), 0);
+  for (size_t i = 0; i < vertex_ends.size(); ++i) {
+    if (used[i] != 0) continue;
+    Junction junction{vertex_ends[i].pixel, {}};
+    for (size_t j = i; j < vertex_ends.size() &&
+                       vertex_ends[j].vertex.x() - vertex_ends[i].vertex.x() < kSameVertex;
+         ++j) {
+      if (used[j] != 0 || !((vertex_ends[j].vertex - vertex_ends[i].vertex).norm() < kSameVertex)) {
+        continue;
+      }
+      used[j] = 1;
+      junction.lines.push_back(vertex_ends[j].line);
+    }
+    std::sort(junction.lines.begin(), junction.lines.end());
+    if (junction.lines.size() >= 2) labels.junctions.push_back(std::move(junction));
+  }
+  std::sort(labels.junctions.begin(),
+            labels.junctions.end(),
+            [](const Junction& a, const Junction& b) { return a.lines < b.lines; });
+  return labels;
+}
+
+}  // namespace dlsd

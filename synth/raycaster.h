@@ -1,0 +1,52 @@
+#pragma once
+// Ray casting against a Scene, in world frame. raycaster.cpp is the only file that knows Embree.
+
+#include <Eigen/Core>
+#include <cstddef>
+#include <memory>
+
+#include "synth/scene.h"
+
+namespace dlsd {
+
+enum class HitKind : uint8_t { kNothing, kFace, kSphere, kDisc };
+
+/// What a ray meets first.
+struct Hit {
+  HitKind kind = HitKind::kNothing;
+  int index = -1;      ///< Of the face, sphere or disc in the scene.
+  float distance = 0;  ///< Along the ray, in lengths of its direction.
+};
+
+/// Immutable after construction; may be used by many threads at once. The scene must outlive it.
+class Raycaster {
+ public:
+  static constexpr size_t kPacket = 16;
+
+  /// Throws SystemError if the ray caster refuses (out of memory).
+  explicit Raycaster(const Scene& scene);
+  ~Raycaster();
+  Raycaster(Raycaster&&) noexcept;
+  Raycaster& operator=(Raycaster&&) noexcept;
+
+  /// First hits of up to 16 coherent rays of unit direction from one origin. Results are those of
+  /// single rays (the caster's robust mode).
+  void castPacket(const Eigen::Vector3f& origin,
+                  const float* x,
+                  const float* y,
+                  const float* z,
+                  size_t count,
+                  Hit* hits) const;
+
+  /// First hit of one ray at a distance in (min_distance, max_distance).
+  [[nodiscard]] Hit cast(const Eigen::Vector3f& origin,
+                         const Eigen::Vector3f& direction,
+                         float min_distance,
+                         float max_distance) const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace dlsd

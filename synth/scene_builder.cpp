@@ -1,0 +1,409 @@
+#include "synth/scene_builder.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+namespace dlsd {
+namespace {
+
+/// Tolerances for "the same line": float-rounded vertices up to 16 m from the origin are 1e-6 m
+/// off.
+constexpr double kSameLine = 3e-6;
+
+double distanceToLine(const Eigen::Vector3d& p, const Edge& line) {
+  const Eigen::Vector3d u = (line.to - line.from).normalized();
+  const Eigen::Vector3d d = p - line.from;
+  return (d - u * u.dot(d)).norm();
+}
+
+/// Both edges lie on one infinite line: the ends of the shorter one are on the longer one's line.
+bool sameLine(const Edge& a, const Edge& b) {
+  const bool a_longer = (a.to - a.from).squaredNorm() >= (b.to - b.from).squaredNorm();
+  const Edge& line = a_longer ? a : b;
+  const Edge& other = a_longer ? b : a;
+  return distanceToLine(other.from, line) < kSameLine && distanceToLine(other.to, line) < kSameLine;
+}
+
+std::vector<double> cuts(double lo, double hi, const std::vector<Pocket>& pockets, bool along_x) {
+  std::vector<double> values{lo, hi};
+  for (const Pocket& p : pockets) {
+    values.push_back(along_x ? p.x0 : p.y0);
+    values.push_back(along_x ? p.x1 : p.y1);
+  }
+  std::sort(values.begin(), values.end());
+  values.erase(std::unique(values.begin(), values.end()), values.end());
+  return values;
+}
+
+bool inPocket(double x, double y, const std::vector<Pocket>& pockets) {
+  return std::any_of(pockets.begin(), pockets.end(), [&](const Pocket& p) {
+    return x > p.x0 && x < p.x1 && y > p.y0 && y < p.y1;
+  });
+}
+
+}  // namespace
+
+int SceneBuilder::addVertex(const Eigen::Vector3d& p) {
+  scene.vertices.emplace_back(p.cast<float>());
+  return static_cast<int>(scene.vertices.size()) - 1;
+}
+
+int SceneBuilder::addSurface(const Surface& surface) {
+  scene.surfaces.push_back(surface);
+  return static_cast<int>(scene.surfaces.size()) - 1;
+}
+
+int SceneBuilder::startFace(const Surface& surface, const Corners& corners) {
+  const auto vertex = [&](int i) {
+    return Eigen::Vector3d(
+        scene.vertices[static_cast<size_t>(corners[static_cast<size_t>(i)])].cast<double>());
+  };
+  Face face;
+  face.origin = vertex(0);
+  // The diagonals' normal: all four rounded corners count alike.
+  face.normal = (vertex(2) - vertex(0)).cross(vertex(3) - vertex(1)).normalized();
+  const Eigen::Vector3d d = vertex(1) - vertex(0);
+  face.e1 = (d - face.normal * face.normal.dot(d)).normalized();
+  face.e2 = face.normal.cross(face.e1);
+  face.surface = addSurface(surface);
+  scene.faces.push_back(std::move(face));
+  return static_cast<int>(scene.faces.size()) - 1;
+}
+
+int SceneBuilder::addQuad(const Surface& surface, const Corners& corners) {
+  const int face = startFace(surface, corners);
+  scene.triangles.push_back({{corners[0], corners[1], corners[2]}, face});
+  scene.triangles.push_back({{corners[0], corners[2], corners[3]}, face});
+  return face;
+}
+
+void SceneBuilder::addEdge(int v0, int v1, int face0, int face1, int rod) {
+  Edge edge;
+  edge.from = scene.vertices[static_cast<size_t>(v0)].cast<double>();
+  edge.to = scene.vertices[static_cast<size_t>(v1)].cast<double>();
+  edge.face0 = face0;
+  edge.face1 = face1;
+  edge.rod = rod;
+  scene.edges.push_back(edge);
+}
+
+PanelFaces SceneBuilder::addPanel(
+    const Frame3& frame, double z, double width, double height, const Panel& panel) {
+  struct Rect {
+    double x0, x1, y0, y1;
+  };
+  // A pocket's bottom is a panel in the same frame, so the work is done on rectangles.
+  const auto add =
+      [&](const auto& self, const Rect& r, double depth_z, const Panel& p) -> PanelFaces {
+    PanelFaces faces;
+    const std::vector<double> xs = cuts(r.x0, r.x1, p.pockets, true);
+    const std::vector<double> ys = cuts(r.y0, r.y1, p.pockets, false);
+    const size_t columns = xs.size();
+    std::vector<int> grid;
+    for (const double y : ys) {
+      for (const double x : xs) grid.push_back(addVertex(frame.at(x, y, depth_z)));
+    }
+    const auto node = [&](size_t i, size_t j) { return grid[j * columns + i]; };
+    const size_t i_end = columns - 1, j_end = ys.size() - 1;
+    faces.front =
+        startFace(p.surface, {node(0, 0), node(i_end, 0), node(i_end, j_end), node(0, j_end)});
+    for (size_t j = 0; j < j_end; ++j) {
+      for (size_t i = 0; i < i_end; ++i) {
+        if (inPocket((xs[i] + xs[i + 1]) / 2, (ys[j] + ys[j + 1]) / 2, p.pockets)) continue;
+        scene.triangles.push_back({{node(i, j), node(i + 1, j), node(i + 1, j + 1)}, faces.front});
+        scene.triangles.push_back({{node(i, j), node(i + 1, j + 1), node(i, j + 1)}, faces.front});
+      }
+    }
+    for (const Pocket& pocket : p.pockets) {
+      const double z_bottom = depth_z - pocket.depth;
+      const auto corners = [&](double zz) -> Corners {
+        return {addVertex(frame.at(pocket.x0, pocket.y0, zz)),
+                addVertex(frame.at(pocket.x1, pocket.y0, zz)),
+                addVertex(frame.at(pocket.x1, pocket.y1, zz)),
+                addVertex(frame.at(pocket.x0, pocket.y1, zz))};
+      };
+      const Corners t = corners(depth_z), b = corners(z_bottom);
+      // Bottom, right, top, left side; each looks into the pocket.
+      const std::array<int, 4> side{addQuad(pocket.sides, {t[0], t[1], b[1], b[0]}),
+                                    addQuad(pocket.sides, {t[1], t[2], b[2], b[1]}),
+                                    addQuad(pocket.sides, {t[2], t[3], b[3], b[2]}),
+                                    addQuad(pocket.sides, {t[3], t[0], b[0], b[3]})};
+      const PanelFaces bottom =
+          self(self, {pocket.x0, pocket.x1, pocket.y0, pocket.y1}, z_bottom, pocket.bottom);
+      for (size_t k = 0; k < 4; ++k) {
+        const size_t next = (k + 1) % 4;
+        addEdge(t[k], t[next], faces.front, side[k]);
+        addEdge(b[k], b[next], side[k], bottom.front);
+        addEdge(t[next], b[next], side[k], side[next]);
+      }
+      faces.pockets.push_back(bottom);
+    }
+    return faces;
+  };
+  return add(add, {0, width, 0, height}, z, panel);
+}
+
+void SceneBuilder::addPieces(const Frame3& frame,
+                             double x0,
+                             double x1,
+                             double y0,
+                             double y1,
+                             double z_front,
+                             double z_back,
+                             const Panel& panel) {
+  const std::vector<double> xs = cuts(x0, x1, panel.pockets, true);
+  const std::vector<double> ys = cuts(y0, y1, panel.pockets, false);
+  for (size_t j = 0; j + 1 < ys.size(); ++j) {
+    for (size_t i = 0; i + 1 < xs.size(); ++i) {
+      const double x = (xs[i] + xs[i + 1]) / 2, y = (ys[j] + ys[j + 1]) / 2;
+      if (inPocket(x, y, panel.pockets)) continue;
+      scene.pieces.push_back(
+          {frame.at(x, y, (z_front + z_back) / 2),
+           frame.axes,
+           {(xs[i + 1] - xs[i]) / 2, (ys[j + 1] - ys[j]) / 2, (z_front - z_back) / 2},
+           object_});
+    }
+  }
+  for (const Pocket& p : panel.pockets) {
+    addPieces(frame, p.x0, p.x1, p.y0, p.y1, z_front - p.depth, z_back, p.bottom);
+  }
+}
+
+SlabFaces SceneBuilder::addSlab(const Frame3& frame,
+                                double width,
+                                double height,
+                                double depth,
+                                const Panel& front,
+                                const Surface& sides,
+                                bool in_floor_corner) {
+  SlabFaces faces{};
+  faces.front = addPanel(frame, 0, width, height, front);
+  const auto corners = [&](double z) -> Corners {
+    return {addVertex(frame.at(0, 0, z)),
+            addVertex(frame.at(width, 0, z)),
+            addVertex(frame.at(width, height, z)),
+            addVertex(frame.at(0, height, z))};
+  };
+  const Corners f = corners(0), b = corners(-depth);
+  faces.bottom = addQuad(sides, {f[0], b[0], b[1], f[1]});
+  faces.right = addQuad(sides, {f[1], b[1], b[2], f[2]});
+  faces.top = addQuad(sides, {f[3], f[2], b[2], b[3]});
+  faces.left = addQuad(sides, {f[3], b[3], b[0], f[0]});
+  faces.back = addQuad(sides, {b[1], b[0], b[3], b[2]});
+  const std::array<int, 4> side{faces.bottom, faces.right, faces.top, faces.left};
+  for (size_t k = 0; k < 4; ++k) {
+    const size_t next = (k + 1) % 4;
+    addEdge(f[k], f[next], faces.front.front, side[k]);
+    if (!(in_floor_corner && k == 0)) addEdge(b[k], b[next], side[k], faces.back);
+    addEdge(f[next], b[next], side[k], side[next]);
+  }
+  addPieces(frame, 0, width, 0, height, 0, -depth, front);
+  return faces;
+}
+
+SlabFaces SceneBuilder::addBox(const Frame3& frame,
+                               const Eigen::Vector3d& lo,
+                               const Eigen::Vector3d& hi,
+                               const Panel& front,
+                               const Surface& sides) {
+  Frame3 slab;
+  slab.origin = frame.at(lo.x(), lo.y(), lo.z());
+  slab.axes << frame.axes.col(0), frame.axes.col(2), -frame.axes.col(1);
+  return addSlab(slab, hi.x() - lo.x(), hi.z() - lo.z(), hi.y() - lo.y(), front, sides);
+}
+
+SlabFaces SceneBuilder::addBox(const Frame3& frame,
+                               const Eigen::Vector3d& lo,
+                               const Eigen::Vector3d& hi,
+                               const Surface& surface) {
+  return addBox(frame, lo, hi, Panel{surface, {}}, surface);
+}
+
+void SceneBuilder::addRod(const Eigen::Vector3d& from,
+                          const Eigen::Vector3d& to,
+                          double radius,
+                          int sides,
+                          const Surface& surface) {
+  const Eigen::Vector3d axis = (to - from).normalized();
+  const Eigen::Vector3d x = axis.unitOrthogonal(), y = axis.cross(x);
+  const auto n = static_cast<size_t>(sides);
+  std::vector<int> a(n), b(n);
+  for (size_t k = 0; k < n; ++k) {
+    const double phi = 2 * M_PI * (static_cast<double>(k) + 0.5) / sides;
+    const Eigen::Vector3d offset = radius * (std::cos(phi) * x + std::sin(phi) * y);
+    a[k] = addVertex(from + offset);
+    b[k] = addVertex(to + offset);
+  }
+  const int rod = static_cast<int>(scene.rods.size());
+  const int first_face = static_cast<int>(scene.faces.size());
+  for (size_t k = 0; k < n; ++k) {
+    const size_t next = (k + 1) % n;
+    addQuad(surface, {a[k], a[next], b[next], b[k]});
+  }
+  // Caps: the corners used for the plane are a quarter turn apart.
+  const size_t q = n / 4;
+  const int cap_a = startFace(surface, {a[0], a[3 * q], a[2 * q], a[q]});
+  const int cap_b = startFace(surface, {b[0], b[q], b[2 * q], b[3 * q]});
+  for (size_t k = 1; k + 1 < n; ++k) {
+    scene.triangles.push_back({{a[0], a[k + 1], a[k]}, cap_a});
+    scene.triangles.push_back({{b[0], b[k], b[k + 1]}, cap_b});
+  }
+  for (size_t k = 0; k < n; ++k) {
+    const size_t next = (k + 1) % n;
+    const int side = first_face + static_cast<int>(k);
+    addEdge(a[next], b[next], side, first_face + static_cast<int>(next), rod);
+    addEdge(a[k], a[next], cap_a, side, rod);
+    addEdge(b[k], b[next], cap_b, side, rod);
+  }
+  Edge centre;
+  centre.from = from;
+  centre.to = to;
+  centre.source = EdgeSource::kRodCentre;
+  centre.rod = rod;
+  scene.edges.push_back(centre);
+  scene.rods.push_back({from, to, radius, first_face, sides + 2});
+  const double half = radius * std::cos(M_PI / sides);
+  Eigen::Matrix3d axes;
+  axes << x, y, axis;
+  scene.pieces.push_back({(from + to) / 2, axes, {half, half, (to - from).norm() / 2}, object_});
+}
+
+void SceneBuilder::addSphere(const Eigen::Vector3d& centre, double radius, const Surface& surface) {
+  scene.spheres.push_back({centre.cast<float>(), static_cast<float>(radius), addSurface(surface)});
+}
+
+void SceneBuilder::addDisc(const Eigen::Vector3d& centre,
+                           const Eigen::Vector3d& normal,
+                           double radius,
+                           const Surface& surface) {
+  scene.discs.push_back({centre.cast<float>(),
+                         normal.normalized().cast<float>(),
+                         static_cast<float>(radius),
+                         addSurface(surface)});
+}
+
+void SceneBuilder::addDecal(int face,
+                            DecalShape shape,
+                            const Eigen::Vector2d& centre,
+                            const Eigen::Vector2d& half,
+                            double angle_rad,
+                            const Surface& surface) {
+  Face& f = scene.faces[static_cast<size_t>(face)];
+  const Eigen::Vector2d axis(std::cos(angle_rad), std::sin(angle_rad));
+  f.decals.push_back({shape, centre, axis, half, addSurface(surface)});
+  if (shape != DecalShape::kRectangle) return;
+  const Eigen::Vector2d x = axis * half.x(), y = Eigen::Vector2d(-axis.y(), axis.x()) * half.y();
+  const std::array<Eigen::Vector2d, 4> corners{
+      centre - x - y, centre + x - y, centre + x + y, centre - x + y};
+  for (size_t k = 0; k < 4; ++k) {
+    Edge edge;
+    edge.from = f.at(corners[k]);
+    edge.to = f.at(corners[(k + 1) % 4]);
+    edge.source = EdgeSource::kDecal;
+    edge.face0 = face;
+    scene.edges.push_back(edge);
+  }
+}
+
+Frame3 SceneBuilder::wallFrame(const Eigen::Vector3d& size, int wall) {
+  const Eigen::Vector3d up = Eigen::Vector3d::UnitZ();
+  const std::array<Eigen::Vector3d, 4> origins{Eigen::Vector3d(size.x(), 0, 0),
+                                               Eigen::Vector3d(0, 0, 0),
+                                               Eigen::Vector3d(0, size.y(), 0),
+                                               Eigen::Vector3d(size.x(), size.y(), 0)};
+  const std::array<Eigen::Vector3d, 4> right{Eigen::Vector3d(-1, 0, 0),
+                                             Eigen::Vector3d(0, 1, 0),
+                                             Eigen::Vector3d(1, 0, 0),
+                                             Eigen::Vector3d(0, -1, 0)};
+  const auto k = static_cast<size_t>(wall);
+  Frame3 frame;
+  frame.origin = origins[k];
+  frame.axes << right[k], up, right[k].cross(up);
+  return frame;
+}
+
+std::array<PanelFaces, 6> SceneBuilder::addRoom(const Eigen::Vector3d& size,
+                                                const std::array<Panel, 4>& walls,
+                                                const Surface& floor,
+                                                const Surface& ceiling) {
+  std::array<PanelFaces, 6> faces;
+  const auto width = [&](int k) { return k % 2 == 0 ? size.x() : size.y(); };
+  for (int k = 0; k < 4; ++k) {
+    const auto i = static_cast<size_t>(k);
+    faces[i] = addPanel(wallFrame(size, k), 0, width(k), size.z(), walls[i]);
+    double deepest = 0.1;
+    for (const Pocket& p : walls[i].pockets) deepest = std::max(deepest, 2 * p.depth + 0.1);
+    addPieces(wallFrame(size, k), 0, width(k), 0, size.z(), 0, -deepest, walls[i]);
+    nextObject();
+  }
+  const auto corners = [&](double z) -> Corners {
+    return {addVertex({0, 0, z}),
+            addVertex({size.x(), 0, z}),
+            addVertex({size.x(), size.y(), z}),
+            addVertex({0, size.y(), z})};
+  };
+  const Corners lo = corners(0), hi = corners(size.z());
+  faces[4].front = addQuad(floor, lo);
+  faces[5].front = addQuad(ceiling, {hi[0], hi[3], hi[2], hi[1]});
+  // Wall k meets floor and ceiling; wall k and the next one meet in a vertical edge.
+  const std::array<std::array<size_t, 2>, 4> ends{{{1, 0}, {0, 3}, {3, 2}, {2, 1}}};
+  for (size_t k = 0; k < 4; ++k) {
+    const auto [v0, v1] = ends[k];
+    addEdge(lo[v0], lo[v1], faces[k].front, faces[4].front);
+    addEdge(hi[v0], hi[v1], faces[k].front, faces[5].front);
+    addEdge(lo[v1], hi[v1], faces[k].front, faces[(k + 1) % 4].front);
+  }
+  for (const double z : {-0.05, size.z() + 0.05}) {
+    scene.pieces.push_back({{size.x() / 2, size.y() / 2, z},
+                            Eigen::Matrix3d::Identity(),
+                            {size.x() / 2, size.y() / 2, 0.05},
+                            object_});
+    nextObject();
+  }
+  return faces;
+}
+
+void SceneBuilder::finish() {
+  // Edges on one line have nearly the same value of a fixed generic function of the line; only
+  // neighbours in that order are compared.
+  constexpr double kWindow = 2e-3;
+  struct Key {
+    double value;
+    size_t edge;
+  };
+  std::vector<Key> keys;
+  for (size_t i = 0; i < scene.edges.size(); ++i) {
+    const Edge& e = scene.edges[i];
+    const Eigen::Vector3d u = (e.to - e.from).normalized();
+    const Eigen::Vector3d m = e.from - u * u.dot(e.from);
+    // |u . c| has no sign, as a line has none.
+    const double value = m.dot(Eigen::Vector3d(0.8147, 1.3472, 2.2361)) +
+                         37 * std::abs(u.dot(Eigen::Vector3d(0.5774, 0.3333, 0.7071)));
+    keys.push_back({value, i});
+  }
+  std::sort(keys.begin(), keys.end(), [](const Key& a, const Key& b) {
+    return a.value != b.value ? a.value < b.value : a.edge < b.edge;
+  });
+  std::vector<size_t> leader(scene.edges.size());
+  for (size_t i = 0; i < leader.size(); ++i) leader[i] = i;
+  const auto find = [&](size_t i) {
+    while (leader[i] != i) i = leader[i];
+    return i;
+  };
+  for (size_t i = 0; i < keys.size(); ++i) {
+    for (size_t j = i + 1; j < keys.size() && keys[j].value - keys[i].value < kWindow; ++j) {
+      const size_t a = find(keys[i].edge), b = find(keys[j].edge);
+      if (a == b || !sameLine(scene.edges[keys[i].edge], scene.edges[keys[j].edge])) continue;
+      leader[std::max(a, b)] = std::min(a, b);
+    }
+  }
+  std::map<size_t, int> numbers;
+  for (size_t i = 0; i < scene.edges.size(); ++i) {
+    const auto [it, added] = numbers.emplace(find(i), static_cast<int>(numbers.size()));
+    scene.edges[i].carrier = it->second;
+  }
+}
+
+}  // namespace dlsd

@@ -1,0 +1,134 @@
+#include "synth/sensor.h"
+
+#include <algorithm>
+#include <cmath>
+#include <sstream>
+#include <stdexcept>
+#include <string_view>
+
+#include "synth/random.h"
+
+namespace dlsd {
+namespace {
+
+/// Stream of the read noise, so that other uses of (seed, index) don't see the same numbers.
+constexpr uint64_t kReadNoiseStream = 0x5ead;
+
+void requireRange(std::string_view name, double value, double lo, double hi) {
+  if (value >= lo && value <= hi) return;
+  std::ostringstream message;
+  message << "sensor." << name << " = " << value << " is out of range: allowed is [" << lo << ", "
+          << hi << "]";
+  throw std::invalid_argument(message.str());
+}
+
+std::string_view toString(Encoding encoding) {
+  switch (encoding) {
+    case Encoding::kLinear:
+      return "linear";
+    case Encoding::kSrgb:
+      return "srgb";
+    case Encoding::kGamma:
+      return "gamma";
+  }
+  return "";
+}
+
+std::vector<float> gaussianKernel(double sigma) {
+  const int radius = std::max(1, static_cast<int>(std::ceil(4 * sigma)));
+  std::vector<double> kernel;
+  double sum = 0;
+  for (int k = -radius; k <= radius; ++k) {
+    kernel.push_back(std::exp(-0.5 * (k / sigma) * (k / sigma)));
+    sum += kernel.back();
+  }
+  std::vector<float> out;
+  out.reserve(kernel.size());
+  for (const double w : kernel) out.push_back(static_cast<float>(w / sum));
+  return out;
+}
+
+}  // namespace
+
+void SensorOptions::check() const {
+  requireRange("psf_sigma_px", psf_sigma_px, 0, 20);
+  requireRange("exposure", exposure, 1e-3, 1e3);
+  requireRange("read_noise_levels", read_noise_levels, 0, 100);
+  requireRange("gamma", gamma, 1, 4);
+}
+
+nlohmann::ordered_json toJson(const SensorOptions& sensor) {
+  nlohmann::ordered_json json{{"psf_sigma_px", sensor.psf_sigma_px},
+                              {"exposure", sensor.exposure},
+                              {"read_noise_levels", sensor.read_noise_levels},
+                              {"encoding", toString(sensor.encoding)}};
+  if (sensor.encoding == Encoding::kGamma) json["gamma"] = sensor.gamma;
+  json["bits"] = 8;
+  return json;
+}
+
+double greyLevel(const SensorOptions& sensor, double radiance) {
+  const double x = std::clamp(radiance * sensor.exposure, 0.0, 1.0);
+  switch (sensor.encoding) {
+    case Encoding::kLinear:
+      return 255 * x;
+    case Encoding::kSrgb:
+      return 255 * (x <= 0.0031308 ? 12.92 * x : 1.055 * std::pow(x, 1 / 2.4) - 0.055);
+    case Encoding::kGamma:
+      return 255 * std::pow(x, 1 / sensor.gamma);
+  }
+  return 0;
+}
+
+void blur(const SensorOptions& sensor, int width, int height, std::vector<float>* radiance) {
+  if (!(sensor.psf_sigma_px > 0)) return;
+  const std::vector<float> kernel = gaussianKernel(sensor.psf_sigma_px);
+  const int radius = static_cast<int>(kernel.size() / 2);
+  const auto w = static_cast<size_t>(width), h = static_cast<size_t>(height);
+  // Rows, through a copy that is continued by the border pixels.
+  std::vector<float> padded(w + 2 * static_cast<size_t>(radius));
+  for (size_t y = 0; y < h; ++y) {
+    float* row = radiance->data() + y * w;
+    for (size_t x = 0; x < padded.size(); ++x) {
+      const int source = std::clamp(static_cast<int>(x) - radius, 0, width - 1);
+      padded[x] = row[source];
+    }
+    std::fill(row, row + w, 0.0F);
+    for (size_t k = 0; k < kernel.size(); ++k) {
+      const float weight = kernel[k];
+      for (size_t x = 0; x < w; ++x) row[x] += weight * padded[x + k];
+    }
+  }
+  // Columns: every output row is a weighted sum of input rows.
+  const std::vector<float> input = *radiance;
+  for (size_t y = 0; y < h; ++y) {
+    float* row = radiance->data() + y * w;
+    std::fill(row, row + w, 0.0F);
+    for (size_t k = 0; k < kernel.size(); ++k) {
+      const int source =
+          std::clamp(static_cast<int>(y) + static_cast<int>(k) - radius, 0, height - 1);
+      const float* in = input.data() + static_cast<size_t>(source) * w;
+      const float weight = kernel[k];
+      for (size_t x = 0; x < w; ++x) row[x] += weight * in[x];
+    }
+  }
+}
+
+Image exposeImage(const SensorOptions& sensor,
+                  int width,
+                  int height,
+                  const std::vector<float>& blurred_radiance,
+                  uint64_t seed,
+                  uint64_t index) {
+  Image image{width, height, 1, 8, {}};
+  image.bytes.resize(blurred_radiance.size());
+  const Random noise(hashCounters({seed, index}), kReadNoiseStream);
+  for (size_t i = 0; i < blurred_radiance.size(); ++i) {
+    double grey = greyLevel(sensor, static_cast<double>(blurred_radiance[i]));
+    if (sensor.read_noise_levels > 0) grey += sensor.read_noise_levels * noise.normal(i);
+    image.bytes[i] = static_cast<uint8_t>(std::clamp(std::floor(grey + 0.5), 0.0, 255.0));
+  }
+  return image;
+}
+
+}  // namespace dlsd
