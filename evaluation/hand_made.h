@@ -1,12 +1,19 @@
 #pragma once
 // Hand-made labels and detections with known answers, for the tests of this folder.
 
+#include <unistd.h>
+
 #include <algorithm>
+#include <filesystem>
 #include <stdexcept>
+#include <string>
 #include <vector>
 
 #include "cameras/arc.h"
+#include "cameras/calibration/calibration.h"
+#include "cameras/calibration/files.h"
 #include "cameras/camera.h"
+#include "synth/dataset/dataset.h"
 #include "synth/dataset/records.h"
 
 namespace dlsd::hand_made {
@@ -59,6 +66,69 @@ inline DetectionLine shifted(const LabelLine& label, const Eigen::Vector2d& shif
 inline DetectionLine reversed(DetectionLine line) {
   std::reverse(line.points.begin(), line.points.end());
   return line;
+}
+
+/// A fresh empty folder below the system's temporary one, removed at the end.
+class TemporaryFolder {
+ public:
+  explicit TemporaryFolder(const std::string& name)
+      : path_(std::filesystem::temp_directory_path() / (name + "-" + std::to_string(::getpid()))) {
+    std::filesystem::remove_all(path_);
+    std::filesystem::create_directories(path_);
+  }
+  ~TemporaryFolder() { std::filesystem::remove_all(path_); }
+  TemporaryFolder(const TemporaryFolder&) = delete;
+  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
+  [[nodiscard]] std::string operator/(const std::string& name) const {
+    return (path_ / name).string();
+  }
+
+ private:
+  std::filesystem::path path_;
+};
+
+/// A grey 640 x 480 image, darker above and brighter below row `step_row`.
+inline Image stepImage(int step_row) {
+  Image image;
+  image.width = 640;
+  image.height = 480;
+  for (int y = 0; y < image.height; ++y) {
+    image.bytes.insert(image.bytes.end(), size_t(image.width), uint8_t(y < step_row ? 60 : 180));
+  }
+  return image;
+}
+
+/// Writes a dataset of pinhole frames, frame i with the labels given for it and a step at row 200,
+/// seen by the cameras "left" and "right" in turn.
+inline void writeDataset(const std::string& folder,
+                         const std::vector<std::vector<LabelLine>>& labels) {
+  for (const char* part : {"/images", "/labels", "/cameras"}) {
+    makeFolders(folder + part);
+  }
+  nlohmann::ordered_json manifest{{"format", kDatasetFormat},
+                                  {"cameras", nlohmann::ordered_json::array()},
+                                  {"frames", nlohmann::ordered_json::array()}};
+  for (const char* name : {"left", "right"}) {
+    const std::string file = std::string("cameras/") + name + ".yaml";
+    saveCameras(folder + "/" + file, {{"cam0", pinholeCamera()}});
+    manifest["cameras"].push_back({{"file", file}});
+  }
+  for (size_t i = 0; i < labels.size(); ++i) {
+    const std::string number = std::string(5, '0') + std::to_string(i);
+    LabelRecord record;
+    record.image = "images/" + number + ".png";
+    record.camera = i % 2 == 0 ? "cameras/left.yaml" : "cameras/right.yaml";
+    record.width = 640;
+    record.height = 480;
+    record.index = i;
+    record.sensor = nlohmann::ordered_json::object();
+    record.lines = labels[i];
+    writeFileAtomically(folder + "/" + record.image, encodePng(stepImage(200)));
+    writeFileAtomically(folder + "/labels/" + number + ".json", toJson(record).dump());
+    manifest["frames"].push_back(
+        {{"image", record.image}, {"labels", "labels/" + number + ".json"}});
+  }
+  writeFileAtomically(folder + "/manifest.json", manifest.dump());
 }
 
 }  // namespace dlsd::hand_made

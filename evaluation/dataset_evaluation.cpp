@@ -1,0 +1,145 @@
+#include "evaluation/dataset_evaluation.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <condition_variable>
+#include <exception>
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <stdexcept>
+#include <thread>
+
+#include "cameras/calibration/files.h"
+#include "detector/detector.h"
+#include "evaluation/detections.h"
+
+namespace dlsd {
+
+DetectionSource detectionsOfFile(const Dataset& dataset, const std::string& path) {
+  std::vector<std::string> images;
+  for (const auto& frame : dataset.manifest().at("frames")) {
+    images.push_back(frame.at("image").get<std::string>());
+  }
+  const auto records = std::make_shared<const std::vector<DetectionRecord>>(
+      matchToImages(readDetections(path), images, dataset.folder(), path));
+  return [records, path]() -> FrameDetections {
+    return [records, path](size_t i, const LabelRecord& labels) {
+      const DetectionRecord& record = records->at(i);
+      if ((record.width != 0 && record.width != labels.width) ||
+          (record.height != 0 && record.height != labels.height)) {
+        throw InputError(fmt::format("{}: image \"{}\" is {}x{} there, {}x{} in the data folder",
+                                     path,
+                                     record.image,
+                                     record.width,
+                                     record.height,
+                                     labels.width,
+                                     labels.height));
+      }
+      return record.lines;
+    };
+  };
+}
+
+DetectionSource detectionsOfDetector(const Dataset& dataset, const std::string& name) {
+  const DetectorOptions options = builtinOptions(name);
+  return [&dataset, options]() -> FrameDetections {
+    const auto detectors = std::make_shared<std::map<std::string, Detector>>();
+    return [&dataset, options, detectors](size_t, const LabelRecord& labels) {
+      auto it = detectors->find(labels.camera);
+      if (it == detectors->end()) {
+        it = detectors->emplace(labels.camera, Detector(dataset.camera(labels), options)).first;
+      }
+      return detectLines(it->second, dataset.image(labels));
+    };
+  };
+}
+
+std::string cameraName(const LabelRecord& labels) {
+  return std::filesystem::path(labels.camera).stem().string();
+}
+
+void evaluateFrames(const Dataset& dataset,
+                    const DetectionSource& source,
+                    const EvaluationOptions& options,
+                    int jobs,
+                    const std::function<void(FrameEvaluation&&)>& take) {
+  options.check();
+  const size_t frames = dataset.size();
+  const size_t cores = std::max(1U, std::thread::hardware_concurrency());
+  const size_t threads = std::min(std::max<size_t>(frames, 1), jobs > 0 ? size_t(jobs) : cores);
+
+  // Frames finish in any order and are handed over in theirs; a thread that is too far ahead waits,
+  // so that few are held at a time.
+  std::mutex mutex;
+  std::condition_variable handed_over;
+  std::map<size_t, FrameEvaluation> finished;
+  size_t next_to_start = 0;
+  size_t next_to_take = 0;
+  std::map<size_t, std::exception_ptr> errors;
+
+  const auto evaluateOne = [&](const FrameDetections& detections, size_t i) {
+    FrameEvaluation frame;
+    frame.labels = dataset.labels(i);
+    try {
+      frame.detections = detections(i, frame.labels);
+      frame.outcome = evaluateFrame(
+          dataset.camera(frame.labels), frame.labels.lines, frame.detections, options);
+    } catch (const std::invalid_argument& error) {
+      throw InputError(fmt::format("{}: {}", frame.labels.image, error.what()));
+    }
+    return frame;
+  };
+  const auto work = [&] {
+    std::unique_lock lock(mutex);
+    std::optional<FrameDetections> detections;
+    while (errors.empty() && next_to_start < frames) {
+      const size_t i = next_to_start++;
+      lock.unlock();
+      std::optional<FrameEvaluation> frame;
+      std::exception_ptr error;
+      try {
+        if (!detections) {
+          detections = source();
+        }
+        frame = evaluateOne(*detections, i);
+      } catch (...) {
+        error = std::current_exception();
+      }
+      lock.lock();
+      if (error) {
+        errors.emplace(i, error);
+        break;
+      }
+      finished.emplace(i, *std::move(frame));
+      try {
+        for (auto it = finished.begin(); it != finished.end() && it->first == next_to_take;
+             it = finished.erase(it), ++next_to_take) {
+          take(std::move(it->second));
+        }
+      } catch (...) {
+        errors.emplace(next_to_take, std::current_exception());
+      }
+      handed_over.notify_all();
+      handed_over.wait(
+          lock, [&] { return !errors.empty() || next_to_start < next_to_take + 4 * threads; });
+    }
+    handed_over.notify_all();
+  };
+  std::vector<std::thread> pool;
+  for (size_t t = 1; t < threads; ++t) {
+    pool.emplace_back(work);
+  }
+  work();
+  for (std::thread& thread : pool) {
+    thread.join();
+  }
+  if (!errors.empty()) {
+    std::rethrow_exception(errors.begin()->second);
+  }
+}
+
+}  // namespace dlsd

@@ -1,0 +1,49 @@
+#pragma once
+// Detections of a whole dataset against its labels.
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "evaluation/evaluate.h"
+#include "evaluation/summary.h"
+#include "synth/dataset/dataset.h"
+
+namespace dlsd {
+
+/// The lines of frame i of a dataset.
+using FrameDetections = std::function<std::vector<DetectionLine>(size_t, const LabelRecord&)>;
+
+/// Makes the above, one for each thread.
+using DetectionSource = std::function<FrameDetections()>;
+
+/// A detections file (JSON Lines), matched to the dataset's images. Throws InputError as
+/// readDetections and matchToImages do; when a frame is read also if its record gives another image
+/// size.
+[[nodiscard]] DetectionSource detectionsOfFile(const Dataset& dataset, const std::string& path);
+
+/// A built-in detector run on the images, each with its own camera. Throws InputError for an
+/// unknown name.
+[[nodiscard]] DetectionSource detectionsOfDetector(const Dataset& dataset, const std::string& name);
+
+/// What a frame shows.
+struct FrameEvaluation {
+  LabelRecord labels;
+  std::vector<DetectionLine> detections;
+  FrameOutcome outcome;
+};
+
+/// "wide" of "cameras/wide.yaml".
+[[nodiscard]] std::string cameraName(const LabelRecord& labels);
+
+/// Evaluates frames in `jobs` threads (0: one per core) and hands them over in the order of the
+/// dataset, one at a time, from the calling thread or another: the same calls whatever the number
+/// of threads. Errors are thrown as InputError naming the image; that of the first frame that has
+/// one.
+void evaluateFrames(const Dataset& dataset,
+                    const DetectionSource& source,
+                    const EvaluationOptions& options,
+                    int jobs,
+                    const std::function<void(FrameEvaluation&&)>& take);
+
+}  // namespace dlsd
