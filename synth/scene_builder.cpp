@@ -284,19 +284,15 @@ void SceneBuilder::addDisc(const Eigen::Vector3d& centre,
                          addSurface(surface)});
 }
 
-void SceneBuilder::addDecal(int face,
-                            DecalShape shape,
-                            const Eigen::Vector2d& centre,
-                            const Eigen::Vector2d& half,
-                            double angle_rad,
-                            const Surface& surface) {
+void SceneBuilder::addDecal(int face, const Print& print) {
   Face& f = scene.faces[static_cast<size_t>(face)];
-  const Eigen::Vector2d axis(std::cos(angle_rad), std::sin(angle_rad));
-  f.decals.push_back({shape, centre, axis, half, addSurface(surface)});
-  if (shape != DecalShape::kRectangle) return;
-  const Eigen::Vector2d x = axis * half.x(), y = Eigen::Vector2d(-axis.y(), axis.x()) * half.y();
-  const std::array<Eigen::Vector2d, 4> corners{
-      centre - x - y, centre + x - y, centre + x + y, centre - x + y};
+  const Eigen::Vector2d axis(std::cos(print.angle_rad), std::sin(print.angle_rad));
+  f.decals.push_back({print.shape, print.centre, axis, print.half, addSurface(print.surface)});
+  if (print.shape != DecalShape::kRectangle) return;
+  const Eigen::Vector2d& c = print.centre;
+  const Eigen::Vector2d x = axis * print.half.x();
+  const Eigen::Vector2d y = Eigen::Vector2d(-axis.y(), axis.x()) * print.half.y();
+  const std::array<Eigen::Vector2d, 4> corners{c - x - y, c + x - y, c + x + y, c - x + y};
   for (size_t k = 0; k < 4; ++k) {
     Edge edge;
     edge.from = f.at(corners[k]);

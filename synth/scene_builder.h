@@ -45,6 +45,14 @@ struct SlabFaces {
   int left, right, top, bottom, back;
 };
 
+/// A decal to be: in the face's 2D frame. (A braced list, so that draws inside it have an order.)
+struct Print {
+  DecalShape shape;
+  Eigen::Vector2d centre, half;
+  double angle_rad;
+  Surface surface;
+};
+
 class SceneBuilder {
  public:
   /// Front of a panel at z = `z` of the frame (x right, y up, z to the viewer), [0, width] x
@@ -86,12 +94,7 @@ class SceneBuilder {
                const Surface& surface);
 
   /// Rectangles bring four edges, ellipses none.
-  void addDecal(int face,
-                DecalShape shape,
-                const Eigen::Vector2d& centre,
-                const Eigen::Vector2d& half,
-                double angle_rad,
-                const Surface& surface);
+  void addDecal(int face, const Print& print);
 
   /// Six inward faces of a box room [0, x] x [0, y] x [0, z]; walls in the order y = 0, x = 0,
   /// y = max, x = max, each as a panel seen from inside. Returns walls, floor, ceiling.

@@ -37,7 +37,7 @@ struct SensorOptions {
 
 /// Gaussian blur of `radiance` (width * height, row-major) in place of optical spread. The image is
 /// continued by its border pixels; pixels with valid == 0 (no ray: black) count as the black they
-/// are. The kernel is the Gaussian integrated over each pixel, cut at 4 sigma and normalised.
+/// are. The kernel is the Gaussian sampled at whole pixels, cut at 4 sigma and normalised.
 void blur(const SensorOptions& sensor, int width, int height, std::vector<float>* radiance);
 
 /// Encodes blurred radiance to 8 bits, with noise from (seed, index, pixel).

@@ -1,0 +1,981 @@
+// Preset "room": a box room with windows in niches, doors, skirting, pictures, shelves with books,
+// tables, chairs, cabinets, lamps, a wireframe of rods, balls and round things.
+//
+// Solids may touch but never enter each other, and no two edges lie on each other, so that every
+// straight step of the picture belongs to exactly one label. Where a real room has things flush
+// (skirting in corners, drawers), there are gaps of a few millimetres.
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "synth/presets.h"
+#include "synth/random.h"
+#include "synth/scene_builder.h"
+
+namespace dlsd {
+namespace {
+
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+
+/// Axis-aligned box of space that something takes.
+struct Box3 {
+  Vector3d lo, hi;
+  [[nodiscard]] bool overlaps(const Box3& other) const {
+    return (lo.array() < other.hi.array()).all() && (other.lo.array() < hi.array()).all();
+  }
+  [[nodiscard]] double distanceTo(const Vector3d& p) const {
+    return (lo - p).cwiseMax(p - hi).cwiseMax(0).norm();
+  }
+};
+
+Panel plain(const Surface& surface) {
+  return {surface, {}};
+}
+
+class RoomMaker {
+ public:
+  RoomMaker(uint64_t seed, uint64_t index) : random_(hashCounters({seed, index}), kStream) {}
+
+  SceneView make() {
+    size_ = {random_.next(3.6, 7.5), random_.next(3.2, 6.5), random_.next(2.4, 3.2)};
+    makeShell();
+    if (random_.nextBool(0.5)) addRug();
+    furnish();
+    addWallThings();
+    addCeilingLamp();
+    addLights();
+    SceneView view;
+    view.pose = makePose();
+    builder_.finish();
+    view.scene = std::move(builder_.scene);
+    return view;
+  }
+
+ private:
+  static constexpr uint64_t kStream = 0x700b;
+  static constexpr double kMargin = 0.02;  ///< Between the boxes that things reserve.
+  static constexpr double kWallGap = 0.04;
+
+  [[nodiscard]] double wallWidth(int wall) const { return wall % 2 == 0 ? size_.x() : size_.y(); }
+
+  Surface paint(double lo, double hi) { return {random_.next(lo, hi), 0}; }
+  /// Any material: dark, middle or bright.
+  Surface anyPaint() { return paint(0.06, 0.85); }
+  Surface near(const Surface& s, double spread) {
+    return {std::clamp(s.albedo * (1 + random_.next(-spread, spread)), 0.02, 0.95), s.emission};
+  }
+
+  /// Box in the world of a box given in a frame.
+  static Box3 boxIn(const Frame3& frame, const Vector3d& lo, const Vector3d& hi) {
+    Box3 box{frame.at(lo.x(), lo.y(), lo.z()), frame.at(lo.x(), lo.y(), lo.z())};
+    for (int k = 1; k < 8; ++k) {
+      const Vector3d p = frame.at((k & 1) != 0 ? hi.x() : lo.x(),
+                                  (k & 2) != 0 ? hi.y() : lo.y(),
+                                  (k & 4) != 0 ? hi.z() : lo.z());
+      box.lo = box.lo.cwiseMin(p);
+      box.hi = box.hi.cwiseMax(p);
+    }
+    return box;
+  }
+
+  [[nodiscard]] bool isFree(const Box3& box) const {
+    const Box3 grown{box.lo.array() - kMargin, box.hi.array() + kMargin};
+    return std::none_of(
+        taken_.begin(), taken_.end(), [&](const Box3& t) { return t.overlaps(grown); });
+  }
+
+  // --- The shell -------------------------------------------------------------------------------
+
+  void makeShell() {
+    const Surface wall_paint = paint(0.45, 0.82);
+    std::array<Panel, 4> walls;
+    struct Pane {
+      int wall;
+      size_t pocket;
+    };
+    std::vector<Pane> windows;
+    const int door_wall = random_.nextInt(0, 3);
+    for (int k = 0; k < 4; ++k) {
+      Panel& wall = walls[static_cast<size_t>(k)];
+      wall.surface = near(wall_paint, 0.12);
+      if (k == door_wall || !random_.nextBool(0.6)) continue;
+      const int count = wallWidth(k) > 5 ? random_.nextInt(1, 2) : 1;
+      for (int i = 0; i < count; ++i) {
+        const double lo = 0.5 + (wallWidth(k) - 1.0) * i / count;
+        const double hi = 0.5 + (wallWidth(k) - 1.0) * (i + 1) / count;
+        wall.pockets.push_back(windowPocket(lo + 0.1, hi - 0.1, wall.surface));
+        windows.push_back({k, wall.pockets.size() - 1});
+      }
+    }
+    floor_paint_ = paint(0.12, 0.55);
+    const auto faces = builder_.addRoom(size_, walls, floor_paint_, near({0.82, 0}, 0.08));
+    floor_ = faces[4].front;
+    ceiling_ = faces[5].front;
+    for (size_t k = 0; k < 4; ++k) wall_faces_[k] = faces[k].front;
+    for (const Pane& w : windows) {
+      const Pocket& pocket = walls[static_cast<size_t>(w.wall)].pockets[w.pocket];
+      const PanelFaces& frame = faces[static_cast<size_t>(w.wall)].pockets[w.pocket];
+      for (size_t p = 0; p < frame.pockets.size(); ++p) {
+        addOutside(frame.pockets[p].front, pocket.bottom.pockets[p]);
+      }
+      const Frame3 f = SceneBuilder::wallFrame(size_, w.wall);
+      // Nothing tall in front of a window.
+      taken_.push_back(boxIn(f, {pocket.x0, pocket.y0, 0}, {pocket.x1, pocket.y1, 0.45}));
+      if (random_.nextBool(0.3)) addBlind(f, pocket);
+      if (random_.nextBool(0.7)) addRadiator(f, pocket);
+    }
+    addDoor(door_wall);
+    addSkirting(door_wall);
+    addFloorPattern();
+  }
+
+  /// A niche with a frame and mullions; the panes glow.
+  Pocket windowPocket(double lo, double hi, const Surface& wall) {
+    const double width = std::min(hi - lo, random_.next(0.9, 2.2));
+    const double x0 = lo + (hi - lo - width) * random_.next(0, 1);
+    const double y0 = random_.next(0.8, 1.0),
+                 y1 = std::min(size_.z() - 0.2, y0 + random_.next(1.0, 1.5));
+    Pocket niche{x0, x0 + width, y0, y1, random_.next(0.1, 0.25), near(wall, 0.1), {}};
+    niche.bottom.surface = paint(0.55, 0.85);
+    const int columns = std::max(1, static_cast<int>(width / random_.next(0.35, 0.8)));
+    const int rows = random_.nextInt(1, 3);
+    const double bar = random_.next(0.035, 0.07), depth = random_.next(0.02, 0.05);
+    const double w = (width - bar * (columns + 1)) / columns;
+    const double h = (y1 - y0 - bar * (rows + 1)) / rows;
+    const double glow = random_.next(0.35, 0.75);
+    for (int j = 0; j < rows; ++j) {
+      for (int i = 0; i < columns; ++i) {
+        const double px = x0 + bar + i * (w + bar), py = y0 + bar + j * (h + bar);
+        niche.bottom.pockets.push_back(
+            {px, px + w, py, py + h, depth, near(niche.bottom.surface, 0.1), plain({0.1, glow})});
+      }
+    }
+    return niche;
+  }
+
+  /// A hint of houses behind a pane.
+  void addOutside(int face, const Pocket& pane) {
+    const double w = pane.x1 - pane.x0, h = pane.y1 - pane.y0;
+    if (!random_.nextBool(0.5) || w < 0.25 || h < 0.3) return;
+    const double hw = w * random_.next(0.15, 0.4), hh = h * random_.next(0.15, 0.42);
+    const Vector2d centre{random_.next(hw + 0.01, w - hw - 0.01), hh + 0.01};
+    const double glow = random_.next(0.1, 0.3);
+    builder_.addDecal(face, {DecalShape::kRectangle, centre, {hw, hh}, 0, {0.1, glow}});
+    if (hw < 0.08) return;
+    builder_.addDecal(face,
+                      {DecalShape::kRectangle,
+                       centre + Vector2d(0, hh * 0.2),
+                       {hw * 0.35, hh * 0.3},
+                       0,
+                       {0.1, glow + 0.15}});
+  }
+
+  void addBlind(const Frame3& wall, const Pocket& niche) {
+    builder_.nextObject();
+    const Surface slat = paint(0.4, 0.85);
+    const double step = random_.next(0.035, 0.06), height = step * random_.next(0.4, 0.7);
+    const double drop = (niche.y1 - niche.y0) * random_.next(0.2, 0.75);
+    const int count = static_cast<int>(drop / step);
+    for (int i = 0; i < count; ++i) {
+      Frame3 f = wall;
+      f.origin = wall.at(niche.x0 + 0.012, niche.y1 - 0.015 - height - i * step, -0.02);
+      builder_.addSlab(
+          f, niche.x1 - niche.x0 - 0.024, height, 0.004, plain(near(slat, 0.03)), slat);
+    }
+  }
+
+  void addRadiator(const Frame3& wall, const Pocket& niche) {
+    const double width = (niche.x1 - niche.x0) * random_.next(0.6, 1.0);
+    const double height = std::min(niche.y0 - 0.25, random_.next(0.4, 0.6));
+    const double depth = 0.07, y0 = 0.14;
+    const double x0 = (niche.x0 + niche.x1 - width) / 2;
+    Frame3 f = wall;
+    f.origin = wall.at(x0, y0, kWallGap + depth);
+    const Box3 box = boxIn(wall, {x0, y0, 0}, {x0 + width, y0 + height, kWallGap + depth});
+    if (!isFree(box)) return;
+    Panel front = plain(paint(0.6, 0.85));
+    const int ribs = std::max(2, static_cast<int>(width / 0.09));
+    for (int i = 0; i < ribs; ++i) {
+      const double rib = width / ribs;
+      front.pockets.push_back({rib * i + 0.025,
+                               rib * (i + 1) - 0.025,
+                               0.04,
+                               height - 0.04,
+                               0.015,
+                               near(front.surface, 0.1),
+                               plain(near(front.surface, 0.15))});
+    }
+    builder_.nextObject();
+    builder_.addSlab(f, width, height, depth, front, front.surface);
+    taken_.push_back(box);
+  }
+
+  void addDoor(int wall) {
+    const Frame3 frame = SceneBuilder::wallFrame(size_, wall);
+    const double width = random_.next(0.85, 1.1), height = random_.next(2.0, 2.2);
+    const double casing = random_.next(0.06, 0.1), proud = random_.next(0.03, 0.06);
+    door_lo_ = random_.next(0.25, wallWidth(wall) - width - 0.25);
+    door_hi_ = door_lo_ + width;
+    Panel front = plain(paint(0.3, 0.85));
+    Pocket leaf{casing,
+                width - casing,
+                0.02,
+                height - casing,
+                proud * 0.6,
+                near(front.surface, 0.1),
+                plain(anyPaint())};
+    const int rows = random_.nextInt(1, 4), columns = random_.nextInt(1, 2);
+    const double leaf_w = leaf.x1 - leaf.x0, leaf_h = leaf.y1 - leaf.y0, rail = 0.11;
+    const double w = (leaf_w - rail * (columns + 1)) / columns;
+    const double h = (leaf_h - rail * (rows + 1)) / rows;
+    for (int j = 0; j < rows; ++j) {
+      for (int i = 0; i < columns; ++i) {
+        const double x = leaf.x0 + rail + i * (w + rail), y = leaf.y0 + rail + j * (h + rail);
+        leaf.bottom.pockets.push_back({x,
+                                       x + w,
+                                       y,
+                                       y + h,
+                                       proud * 0.25,
+                                       near(leaf.bottom.surface, 0.15),
+                                       plain(near(leaf.bottom.surface, 0.25))});
+      }
+    }
+    front.pockets.push_back(leaf);
+    Frame3 f = frame;
+    f.origin = frame.at(door_lo_, 0, proud);
+    builder_.nextObject();
+    builder_.addSlab(f, width, height, proud, front, front.surface, true);
+    // The handle, on the rail beside the panels.
+    Frame3 handle = frame;
+    handle.origin = frame.at(door_lo_ + leaf.x0 + 0.03, 1.02, proud - leaf.depth + 0.03);
+    const Surface metal = paint(0.3, 0.8);
+    builder_.addSlab(handle, 0.05, 0.02, 0.03, plain(metal), metal);
+    taken_.push_back(boxIn(frame, {door_lo_, 0, 0}, {door_hi_, height, 0.8}));
+  }
+
+  void addSkirting(int door_wall) {
+    const double height = random_.next(0.06, 0.12), thick = 0.015, gap = 0.003;
+    const Surface surface = paint(0.25, 0.85);
+    const auto piece = [&](int wall, double x0, double x1) {
+      if (x1 - x0 < 0.05) return;
+      Frame3 f = SceneBuilder::wallFrame(size_, wall);
+      f.origin = f.at(x0, 0, thick);
+      builder_.nextObject();
+      builder_.addSlab(f, x1 - x0, height, thick, plain(surface), surface, true);
+    };
+    for (int k = 0; k < 4; ++k) {
+      const double inset = k % 2 == 0 ? gap : thick + gap;
+      const double lo = inset, hi = wallWidth(k) - inset;
+      if (k == door_wall) {
+        piece(k, lo, door_lo_ - gap);
+        piece(k, door_hi_ + gap, hi);
+      } else {
+        piece(k, lo, hi);
+      }
+    }
+  }
+
+  /// Planks or tiles, as prints with joints between.
+  void addFloorPattern() {
+    const int kind = random_.nextInt(0, 2);
+    if (kind == 0) return;
+    plain_floor_ = false;
+    const bool planks = kind == 1;
+    const double w = planks ? random_.next(0.6, 1.4) : random_.next(0.3, 0.6);
+    const double h = planks ? random_.next(0.12, 0.22) : w;
+    const double joint = planks ? 0.006 : random_.next(0.006, 0.015);
+    const double margin = 0.05;
+    const double spread = planks ? 0.25 : 0.08;
+    const Surface tile = near(floor_paint_, 0.5);
+    for (int j = 0; margin + (j + 1) * h < size_.y() - margin; ++j) {
+      const double y = margin + j * h;
+      const double start = planks ? -w * random_.next(0, 1) : 0;
+      for (int i = 0;; ++i) {
+        const double x0 = std::max(margin, margin + start + i * w);
+        const double x1 = std::min(size_.x() - margin, margin + start + (i + 1) * w);
+        if (x0 > size_.x() - margin - 0.1) break;
+        if (x1 - x0 < 0.1) continue;
+        builder_.addDecal(floor_,
+                          {DecalShape::kRectangle,
+                           {(x0 + x1) / 2, y + h / 2},
+                           {(x1 - x0 - joint) / 2, (h - joint) / 2},
+                           0,
+                           near(tile, spread)});
+      }
+    }
+  }
+
+  void addRug() {
+    if (!plain_floor_) return;
+    const Vector2d half{random_.next(0.5, size_.x() * 0.3), random_.next(0.4, size_.y() * 0.3)};
+    const Vector2d centre{size_.x() / 2 + random_.next(-0.3, 0.3),
+                          size_.y() / 2 + random_.next(-0.3, 0.3)};
+    const double angle = random_.nextBool(0.4) ? random_.next(-0.4, 0.4) : 0.0;
+    builder_.addDecal(floor_, {DecalShape::kRectangle, centre, half, angle, anyPaint()});
+    const double border = random_.next(0.03, 0.12);
+    const Vector2d inner = half.array() - border;
+    builder_.addDecal(floor_, {DecalShape::kRectangle, centre, inner, angle, anyPaint()});
+    if (random_.nextBool(0.5)) {
+      builder_.addDecal(floor_, {DecalShape::kEllipse, centre, inner * 0.5, angle, anyPaint()});
+    }
+  }
+
+  // --- Furniture -------------------------------------------------------------------------------
+
+  /// A place on the floor for a thing of this size (x right, y depth, z up, front at y = 0 looking
+  /// to -y), with its back to a wall, in the open or turned freely. Reserves it.
+  std::optional<Frame3> place(const Vector3d& size, double at_wall_probability) {
+    for (int attempt = 0; attempt < 25; ++attempt) {
+      Frame3 f;
+      if (random_.nextBool(at_wall_probability)) {
+        const int wall = random_.nextInt(0, 3);
+        if (wallWidth(wall) < size.x() + 0.2) continue;
+        const Frame3 w = SceneBuilder::wallFrame(size_, wall);
+        const double x = random_.next(0.1, wallWidth(wall) - size.x() - 0.1);
+        f.origin = w.at(x, 0, kWallGap + size.y());
+        f.axes << w.axes.col(0), -w.axes.col(2), Vector3d::UnitZ();
+      } else {
+        const double yaw =
+            random_.nextBool(0.5) ? random_.nextInt(0, 3) * M_PI / 2 : random_.next(0, 2 * M_PI);
+        f.axes = Eigen::AngleAxisd(yaw, Vector3d::UnitZ()).toRotationMatrix();
+        const Vector3d half = f.axes * Vector3d(size.x() / 2, size.y() / 2, 0);
+        const Vector3d centre{
+            random_.next(0.4, size_.x() - 0.4), random_.next(0.4, size_.y() - 0.4), 0};
+        f.origin = centre - half;
+      }
+      const Box3 box = boxIn(f, {0, 0, 0}, size);
+      const Vector3d room_lo(kWallGap - 0.001, kWallGap - 0.001, -1);
+      const Vector3d room_hi(size_.x() - room_lo.x(), size_.y() - room_lo.y(), size_.z() - 0.05);
+      const bool inside =
+          (box.lo.array() >= room_lo.array()).all() && (box.hi.array() <= room_hi.array()).all();
+      if (!inside || !isFree(box)) continue;
+      taken_.push_back(box);
+      builder_.nextObject();
+      return f;
+    }
+    return std::nullopt;
+  }
+
+  void furnish() {
+    addBookshelf();
+    if (random_.nextBool(0.6)) addBookshelf();
+    addTable();
+    addCabinet();
+    if (random_.nextBool(0.5)) addCabinet();
+    addWireframe();
+    if (random_.nextBool(0.5)) addWireframe();
+    const int chairs = random_.nextInt(1, 3);
+    for (int i = 0; i < chairs; ++i) addChair();
+    const int boxes = random_.nextInt(1, 4);
+    for (int i = 0; i < boxes; ++i) addCartons();
+    if (random_.nextBool(0.6)) addStool();
+    if (random_.nextBool(0.6)) addFloorLamp();
+    const int balls = random_.nextInt(0, 3);
+    for (int i = 0; i < balls; ++i) addBall();
+  }
+
+  /// Books (upright boxes) from x0 to x1 on a board; y is the front, +y the back.
+  void addBooks(const Frame3& f,
+                double x0,
+                double x1,
+                double y_front,
+                double depth,
+                double z,
+                double height) {
+    double x = x0 + random_.next(0.004, 0.03);
+    const Surface series = anyPaint();
+    const bool uniform = random_.nextBool(0.3);
+    while (true) {
+      const double w = random_.next(0.014, 0.055);
+      if (x + w > x1 - 0.004) break;
+      const double h = height * random_.next(0.6, 0.93);
+      const double d = depth * random_.next(0.6, 0.92);
+      const double y = y_front + depth * random_.next(0.01, 0.06);
+      const Surface cover = uniform ? near(series, 0.15) : anyPaint();
+      const SlabFaces book = builder_.addBox(f, {x, y, z}, {x + w, y + d, z + h}, cover);
+      if (w > 0.025 && random_.nextBool(0.5)) {
+        builder_.addDecal(book.front.front,
+                          {DecalShape::kRectangle,
+                           {w / 2, h * random_.next(0.6, 0.75)},
+                           {w * 0.32, h * 0.12},
+                           0,
+                           anyPaint()});
+      }
+      x += w + random_.next(0.0015, 0.004);
+      if (random_.nextBool(0.12)) x += random_.next(0.02, 0.12);
+    }
+  }
+
+  void addBookshelf() {
+    const int columns = random_.nextInt(1, 3), rows = random_.nextInt(2, 6);
+    const double board = random_.next(0.018, 0.03), depth = random_.next(0.22, 0.36);
+    const double w = random_.next(0.45, 0.85), h = random_.next(0.27, 0.38);
+    const Vector3d size(columns * (w + board) + board,
+                        depth,
+                        std::min(size_.z() - 0.15, rows * (h + board) + board));
+    const auto f = place(size, 1);
+    if (!f) return;
+    const double hh = (size.z() - board) / rows - board;
+    const Surface wood = paint(0.15, 0.8);
+    Panel front = plain(wood);
+    for (int j = 0; j < rows; ++j) {
+      for (int i = 0; i < columns; ++i) {
+        const double x = board + i * (w + board), z = board + j * (hh + board);
+        front.pockets.push_back(
+            {x, x + w, z, z + hh, depth - 0.012, near(wood, 0.12), plain(near(wood, 0.2))});
+      }
+    }
+    builder_.addBox(*f, {0, 0, 0}, size, front, wood);
+    for (const Pocket& p : front.pockets) {
+      builder_.nextObject();
+      const double what = random_.next(0, 1);
+      if (what < 0.6) {
+        addBooks(
+            *f, p.x0, p.x0 + (p.x1 - p.x0) * random_.next(0.4, 1.0), 0.01, depth - 0.03, p.y0, hh);
+      } else if (what < 0.75) {
+        const double a = random_.next(0.12, 0.3), b = hh * random_.next(0.4, 0.8);
+        const double x = p.x0 + random_.next(0.02, p.x1 - p.x0 - a - 0.02);
+        builder_.addBox(
+            *f, {x, 0.03, p.y0}, {x + a, 0.03 + std::min(a, depth - 0.06), p.y0 + b}, anyPaint());
+      } else if (what < 0.88) {
+        const double r = std::min(0.09, hh * 0.4);
+        builder_.addSphere(f->at((p.x0 + p.x1) / 2, depth / 2, p.y0 + r), r, anyPaint());
+      }
+    }
+  }
+
+  void addCabinet() {
+    const Vector3d size{random_.next(0.5, 1.4), random_.next(0.38, 0.55), random_.next(0.6, 1.9)};
+    const auto f = place(size, 1);
+    if (!f) return;
+    const Surface body = paint(0.15, 0.85);
+    const bool drawers = random_.nextBool(0.5);
+    const int columns = std::max(1, static_cast<int>(size.x() / 0.5));
+    const int rows =
+        drawers ? std::max(1, static_cast<int>(size.z() / 0.24)) : random_.nextInt(1, 2);
+    Panel front = plain(body);
+    const double rim = 0.02, foot = 0.06;
+    const double w = (size.x() - rim * (columns + 1)) / columns;
+    const double h = (size.z() - foot - rim * (rows + 1)) / rows;
+    const double depth = random_.next(0.006, 0.015);
+    for (int j = 0; j < rows; ++j) {
+      for (int i = 0; i < columns; ++i) {
+        const double x = rim + i * (w + rim), z = foot + rim + j * (h + rim);
+        front.pockets.push_back(
+            {x, x + w, z, z + h, depth, near(body, 0.1), plain(near(body, 0.3))});
+      }
+    }
+    builder_.addBox(*f, {0, 0, 0}, size, front, body);
+    const Surface metal = paint(0.1, 0.8);
+    for (const Pocket& p : front.pockets) {
+      // A bar handle on the leaf, in touch with it.
+      const double hw = drawers ? std::min(0.14, w * 0.4) : 0.015, hh = drawers ? 0.012 : 0.1;
+      const double x = drawers ? (p.x0 + p.x1 - hw) / 2 : p.x1 - 0.05;
+      const double z = drawers ? p.y0 + (p.y1 - p.y0) * 0.6 : (p.y0 + p.y1 - hh) / 2;
+      builder_.addBox(*f, {x, -0.022, z}, {x + hw, depth, z + hh}, metal);
+    }
+    addTopThings(*f, size);
+  }
+
+  /// Things that stand on a flat top: [0, size.x] x [0, size.y] at z = size.z.
+  void addTopThings(const Frame3& f, const Vector3d& size) {
+    builder_.nextObject();
+    double x = random_.next(0.03, 0.2);
+    const double y_max = size.y() - 0.02;
+    while (true) {
+      const int what = random_.nextInt(0, 4);
+      const double w = random_.next(0.12, 0.4);
+      if (x + w > size.x() - 0.03) break;
+      const double z = size.z();
+      const double d = std::min(w * random_.next(0.5, 1.2), y_max - 0.06);
+      const double y = random_.next(0.03, y_max - d);
+      if (what == 0) {
+        // A stack, each one inside the one below.
+        double inset = 0, level = z;
+        const int count = random_.nextInt(2, 4);
+        for (int i = 0; i < count; ++i) {
+          const double thick = random_.next(0.015, 0.05);
+          const Surface cover = anyPaint();
+          builder_.addBox(f,
+                          {x + inset, y + inset, level},
+                          {x + w - inset, y + d - inset, level + thick},
+                          cover);
+          inset += random_.next(0.004, 0.02);
+          level += thick;
+        }
+      } else if (what == 1) {
+        const double r = std::min({w / 2, d / 2, 0.12});
+        builder_.addSphere(f.at(x + w / 2, y + d / 2, z + r), r, anyPaint());
+      } else if (what == 2) {
+        const double h = random_.next(0.08, 0.35);
+        const Surface cover = anyPaint();
+        const SlabFaces box = builder_.addBox(f, {x, y, z}, {x + w, y + d, z + h}, cover);
+        builder_.addDecal(
+            box.front.front,
+            {DecalShape::kRectangle, {w * 0.5, h * 0.5}, {w * 0.3, h * 0.25}, 0, near(cover, 0.6)});
+      } else if (what == 3) {
+        addScreen(f, x, x + w, (y + y + d) / 2, z);
+      } else {
+        addDeskLamp(f, x + w / 2, y + d / 2, z, std::min(w, d) / 2);
+      }
+      x += w + random_.next(0.02, 0.3);
+    }
+  }
+
+  void addScreen(const Frame3& f, double x0, double x1, double y, double z) {
+    const double w = x1 - x0, h = w * 0.62;
+    const Surface body = paint(0.05, 0.3);
+    builder_.addBox(f, {x0 + w * 0.3, y - 0.035, z}, {x1 - w * 0.3, y + 0.035, z + 0.012}, body);
+    Panel front = plain(body);
+    front.pockets.push_back(
+        {0.012, w - 0.012, 0.02, h - 0.012, 0.004, body, plain({0.05, random_.next(0, 0.4)})});
+    builder_.addBox(f, {x0, y - 0.012, z + 0.012}, {x1, y + 0.012, z + 0.012 + h}, front, body);
+  }
+
+  void addDeskLamp(const Frame3& f, double x, double y, double z, double room) {
+    const Surface metal = anyPaint();
+    const double base = std::min(0.08, room * 0.9), height = random_.next(0.2, 0.45);
+    builder_.addBox(f, {x - base, y - base, z}, {x + base, y + base, z + 0.02}, metal);
+    const double r = 0.05;
+    builder_.addRod(f.at(x, y, z + 0.02), f.at(x, y, z + height + r * 0.5), 0.006, 4, metal);
+    builder_.addSphere(f.at(x, y, z + height + r), r, {0.5, random_.next(0.2, 0.5)});
+  }
+
+  void addLegs(const Frame3& f,
+               const Vector3d& size,
+               double top,
+               double thick,
+               double inset,
+               const Surface& s) {
+    for (const double x : {inset, size.x() - inset - thick}) {
+      for (const double y : {inset, size.y() - inset - thick}) {
+        builder_.addBox(f, {x, y, 0}, {x + thick, y + thick, size.z() - top}, s);
+      }
+    }
+  }
+
+  void addTable() {
+    const Vector3d size{random_.next(0.9, 1.8), random_.next(0.6, 0.95), random_.next(0.7, 0.76)};
+    // The top's things stand up to 0.6 m high.
+    const auto f = place({size.x(), size.y(), size.z() + 0.6}, 0.5);
+    if (!f) return;
+    const Surface wood = paint(0.12, 0.75);
+    const double top = random_.next(0.02, 0.045);
+    const SlabFaces board = builder_.addBox(*f, {0, 0, size.z() - top}, size, wood);
+    addLegs(*f, size, top, random_.next(0.035, 0.07), random_.next(0.012, 0.06), near(wood, 0.3));
+    if (random_.nextBool(0.5)) {
+      addTopThings(*f, size);
+      return;
+    }
+    // Sheets of paper with printed blocks; the top's 2D frame starts at its front left corner.
+    const int sheets = std::min(4, static_cast<int>(size.x() / 0.4));
+    for (int i = 0; i < sheets; ++i) {
+      const Vector2d centre{0.2 + 0.4 * i + random_.next(-0.02, 0.02),
+                            size.y() * random_.next(0.4, 0.6)};
+      const double angle = random_.next(-0.5, 0.5);
+      const Surface paper = paint(0.65, 0.9);
+      const double scale = random_.next(0.75, 1.0);
+      builder_.addDecal(
+          board.top,
+          {DecalShape::kRectangle, centre, Vector2d(0.105, 0.1485) * scale, angle, paper});
+      const Vector2d ax(std::cos(angle), std::sin(angle)), ay(-ax.y(), ax.x());
+      for (int line = -2; line <= 2; ++line) {
+        builder_.addDecal(board.top,
+                          {DecalShape::kRectangle,
+                           centre + ay * (0.045 * line * scale) + ax * random_.next(-0.01, 0.01),
+                           Vector2d{random_.next(0.04, 0.08), 0.009} * scale,
+                           angle,
+                           paint(0.1, 0.5)});
+      }
+    }
+  }
+
+  void addChair() {
+    const Vector3d size{random_.next(0.4, 0.5), random_.next(0.4, 0.5), random_.next(0.42, 0.48)};
+    const double back = random_.next(0.35, 0.55);
+    const auto f = place({size.x(), size.y(), size.z() + back}, 0.15);
+    if (!f) return;
+    const Surface wood = anyPaint();
+    const double top = 0.03, leg = random_.next(0.025, 0.04), inset = 0.012;
+    builder_.addBox(*f, {0, 0, size.z() - top}, size, wood);
+    addLegs(*f, size, top, leg, inset, near(wood, 0.15));
+    const double y = size.y() - inset - leg, z = size.z();
+    for (const double x : {inset, size.x() - inset - leg}) {
+      builder_.addBox(*f, {x, y, z}, {x + leg, y + leg, z + back}, wood);
+    }
+    const int slats = random_.nextInt(1, 4);
+    for (int i = 0; i < slats; ++i) {
+      const double step = (back - 0.08) / slats;
+      const double lo = z + 0.06 + step * i;
+      builder_.addBox(*f,
+                      {inset + leg, y + leg * 0.3, lo},
+                      {size.x() - inset - leg, y + leg * 0.7, lo + step * 0.6},
+                      near(wood, 0.2));
+    }
+  }
+
+  void addCartons() {
+    const Vector3d size{random_.next(0.25, 0.6), random_.next(0.25, 0.5), random_.next(0.2, 0.45)};
+    const bool stacked = random_.nextBool(0.4);
+    const auto f = place({size.x(), size.y(), size.z() * (stacked ? 1.8 : 1.0)}, 0.4);
+    if (!f) return;
+    const Surface card = paint(0.2, 0.7);
+    const SlabFaces box = builder_.addBox(*f, {0, 0, 0}, size, card);
+    const double tape = random_.next(0.02, 0.04);
+    builder_.addDecal(box.top,
+                      {DecalShape::kRectangle,
+                       {size.x() / 2, size.y() / 2},
+                       {size.x() * 0.49, tape},
+                       0,
+                       near(card, 0.5)});
+    if (random_.nextBool(0.6)) {
+      builder_.addDecal(box.front.front,
+                        {DecalShape::kRectangle,
+                         {size.x() * 0.6, size.z() * 0.55},
+                         {size.x() * 0.2, size.z() * 0.2},
+                         0,
+                         paint(0.6, 0.9)});
+    }
+    if (!stacked) return;
+    const double inset = random_.next(0.015, 0.06);
+    builder_.addBox(*f,
+                    {inset, inset, size.z()},
+                    {size.x() - inset, size.y() - inset, size.z() * 1.75},
+                    near(card, 0.5));
+  }
+
+  void addStool() {
+    const double r = random_.next(0.16, 0.35), height = random_.next(0.42, 0.75);
+    const auto f = place({2 * r, 2 * r, height}, 0.2);
+    if (!f) return;
+    builder_.addDisc(f->at(r, r, height - 0.002), Vector3d::UnitZ(), r, anyPaint());
+    const Surface metal = paint(0.1, 0.7);
+    for (int k = 0; k < 4; ++k) {
+      const double a = M_PI / 4 + k * M_PI / 2;
+      const Vector3d dir(std::cos(a), std::sin(a), 0);
+      builder_.addRod(f->at(r + 0.9 * r * dir.x(), r + 0.9 * r * dir.y(), 0.001),
+                      f->at(r + 0.6 * r * dir.x(), r + 0.6 * r * dir.y(), height - 0.012),
+                      0.011,
+                      8,
+                      metal);
+    }
+  }
+
+  void addFloorLamp() {
+    const double height = random_.next(1.3, 1.8), half = 0.15;
+    const auto f = place({2 * half, 2 * half, height}, 0.5);
+    if (!f) return;
+    const Surface metal = paint(0.05, 0.6);
+    builder_.addBox(*f, {half - 0.13, half - 0.13, 0}, {half + 0.13, half + 0.13, 0.025}, metal);
+    const double r = random_.next(0.1, 0.14);
+    builder_.addRod(f->at(half, half, 0.025), f->at(half, half, height - 1.5 * r), 0.012, 8, metal);
+    builder_.addSphere(f->at(half, half, height - r), r, {0.6, random_.next(0.25, 0.5)});
+  }
+
+  void addBall() {
+    const double r = random_.next(0.06, 0.25);
+    const auto f = place({2 * r, 2 * r, 2 * r}, 0.3);
+    if (!f) return;
+    builder_.addSphere(f->at(r, r, r), r, anyPaint());
+  }
+
+  /// Free-standing rods between nodes; small spheres cover the joints.
+  void addWireframe() {
+    const Vector3d size{random_.next(0.5, 1.1), random_.next(0.4, 0.9), random_.next(0.6, 1.7)};
+    const auto f = place(size, 0.1);
+    if (!f) return;
+    const double radius = random_.next(0.003, 0.011);
+    const Surface metal = random_.nextBool(0.5) ? paint(0.03, 0.15) : paint(0.5, 0.9);
+    const double ball = 2.8 * radius;
+    const int sides = random_.nextBool(0.5) ? 4 : 8;
+    std::vector<Vector3d> nodes;
+    const auto node = [&](double x, double y, double z) {
+      // Nodes stay inside the reserved box and on the floor.
+      nodes.push_back(f->at(ball + x * (size.x() - 2 * ball),
+                            ball + y * (size.y() - 2 * ball),
+                            ball + z * (size.z() - 2 * ball)));
+    };
+    std::vector<std::array<size_t, 2>> links;
+    if (random_.nextBool(0.65)) {
+      // A frame of storeys, with a few diagonals: no two of them in one plane cross.
+      const int storeys = random_.nextInt(1, 3);
+      for (int s = 0; s <= storeys; ++s) {
+        const double z = static_cast<double>(s) / storeys;
+        const double shrink = 0.12 * s * random_.next(0, 1);
+        node(shrink, shrink, z);
+        node(1 - shrink, shrink, z);
+        node(1 - shrink, 1 - shrink, z);
+        node(shrink, 1 - shrink, z);
+        const auto base = static_cast<size_t>(4 * s);
+        for (size_t k = 0; k < 4; ++k) {
+          links.push_back({base + k, base + (k + 1) % 4});
+          if (s == 0) continue;
+          links.push_back({base + k - 4, base + k});
+          if (random_.nextBool(0.4)) links.push_back({base + k - 4, base + (k + 1) % 4});
+        }
+      }
+    } else {
+      // A double pyramid over a polygon.
+      const int corners = random_.nextInt(3, 6);
+      node(0.5, 0.5, 0);
+      node(0.5, 0.5, 1);
+      const double turn = random_.next(0, 1), level = random_.next(0.3, 0.7);
+      for (int k = 0; k < corners; ++k) {
+        const double a = 2 * M_PI * (k + turn) / corners;
+        node(0.5 + 0.5 * std::cos(a), 0.5 + 0.5 * std::sin(a), level);
+        const auto at = static_cast<size_t>(k + 2);
+        links.push_back({0, at});
+        links.push_back({1, at});
+        links.push_back({at, static_cast<size_t>((k + 1) % corners + 2)});
+      }
+    }
+    for (const Vector3d& n : nodes) builder_.addSphere(n, ball, metal);
+    for (const auto& [a, b] : links) {
+      const Vector3d d = (nodes[b] - nodes[a]).normalized();
+      builder_.nextObject();
+      builder_.addRod(
+          nodes[a] + 2.4 * radius * d, nodes[b] - 2.4 * radius * d, radius, sides, metal);
+    }
+  }
+
+  // --- On walls and ceiling --------------------------------------------------------------------
+
+  void addWallThings() {
+    for (int wall = 0; wall < 4; ++wall) {
+      const int count = random_.nextInt(2, 5);
+      for (int i = 0; i < count; ++i) {
+        const int what = random_.nextInt(0, 4);
+        if (what <= 1) {
+          addPicture(wall);
+        } else if (what == 2) {
+          addWallBoard(wall);
+        } else if (what == 3) {
+          addPoster(wall);
+        } else {
+          addSwitch(wall);
+        }
+      }
+    }
+  }
+
+  /// A free rectangle on a wall, [x, x + w] x [y, y + h], out to `depth`. Reserves it.
+  std::optional<Vector2d> placeOnWall(
+      int wall, double w, double h, double depth, double y_lo, double y_hi) {
+    if (w > wallWidth(wall) - 0.3 || y_hi < y_lo) return std::nullopt;
+    const Frame3 frame = SceneBuilder::wallFrame(size_, wall);
+    for (int attempt = 0; attempt < 12; ++attempt) {
+      const double x = random_.next(0.15, wallWidth(wall) - w - 0.15), y = random_.next(y_lo, y_hi);
+      const Box3 box = boxIn(frame, {x, y, 0}, {x + w, y + h, depth});
+      if (!isFree(box)) continue;
+      taken_.push_back(box);
+      builder_.nextObject();
+      return Vector2d(x, y);
+    }
+    return std::nullopt;
+  }
+
+  void addPicture(int wall) {
+    const double w = random_.next(0.25, 0.9), h = w * random_.next(0.6, 1.5);
+    const double thick = random_.next(0.012, 0.035), rim = random_.next(0.015, 0.05);
+    if (h > 1.1) return;
+    const auto at = placeOnWall(wall, w, h, thick, 1.0, size_.z() - h - 0.2);
+    if (!at) return;
+    Frame3 f = SceneBuilder::wallFrame(size_, wall);
+    f.origin = f.at(at->x(), at->y(), thick);
+    Panel front = plain(anyPaint());
+    front.pockets.push_back(
+        {rim, w - rim, rim, h - rim, thick * 0.4, near(front.surface, 0.1), plain(anyPaint())});
+    const SlabFaces faces = builder_.addSlab(f, w, h, thick, front, front.surface);
+    const int canvas = faces.front.pockets[0].front;
+    const double cw = w - 2 * rim, ch = h - 2 * rim;
+    const Vector2d centre(cw / 2, ch / 2);
+    if (random_.nextBool(0.6)) {
+      const double mat = random_.next(0.65, 0.85);
+      builder_.addDecal(canvas, {DecalShape::kRectangle, centre, centre * mat, 0, anyPaint()});
+      addPrint(canvas, centre, centre * (mat * 0.9));
+    } else {
+      addPrint(canvas, centre, centre * 0.92);
+    }
+  }
+
+  /// Abstract art: cells of a coarse grid, each with a shape.
+  void addPrint(int face, const Vector2d& centre, const Vector2d& half) {
+    const int columns = random_.nextInt(1, 3), rows = random_.nextInt(1, 3);
+    const Vector2d cell(2 * half.x() / columns, 2 * half.y() / rows);
+    for (int j = 0; j < rows; ++j) {
+      for (int i = 0; i < columns; ++i) {
+        if (random_.nextBool(0.25)) continue;
+        const Vector2d c = centre - half + Vector2d((i + 0.5) * cell.x(), (j + 0.5) * cell.y());
+        if (random_.nextBool(0.3)) {
+          builder_.addDecal(
+              face, {DecalShape::kEllipse, c, cell * random_.next(0.25, 0.45), 0, anyPaint()});
+        } else if (random_.nextBool(0.4)) {
+          // Turned, within the circle that the cell holds.
+          const double r = 0.45 * cell.minCoeff(), a = random_.next(0.3, 1.2);
+          builder_.addDecal(face,
+                            {DecalShape::kRectangle,
+                             c,
+                             {r * std::cos(a), r * std::sin(a)},
+                             random_.next(0, M_PI),
+                             anyPaint()});
+        } else {
+          builder_.addDecal(
+              face,
+              {DecalShape::kRectangle,
+               c,
+               Vector2d{cell.x() * random_.next(0.2, 0.45), cell.y() * random_.next(0.2, 0.45)},
+               0,
+               anyPaint()});
+        }
+      }
+    }
+  }
+
+  /// Printed on the wall itself.
+  void addPoster(int wall) {
+    const double w = random_.next(0.3, 0.9), h = w * random_.next(0.7, 1.45);
+    const auto at = placeOnWall(wall, w, h, 0.005, 0.7, size_.z() - h - 0.15);
+    if (!at) return;
+    const Vector2d centre = *at + Vector2d(w / 2, h / 2);
+    const int face = wall_faces_[static_cast<size_t>(wall)];
+    builder_.addDecal(face, {DecalShape::kRectangle, centre, {w / 2, h / 2}, 0, anyPaint()});
+    addPrint(face, centre, Vector2d(w, h) * 0.44);
+  }
+
+  /// A board with things on it.
+  void addWallBoard(int wall) {
+    const double w = random_.next(0.5, 1.4), depth = random_.next(0.16, 0.28),
+                 thick = random_.next(0.018, 0.035);
+    const double above = 0.36;
+    const auto at =
+        placeOnWall(wall, w, thick + above, depth + 0.02, 0.9, size_.z() - above - 0.25);
+    if (!at) return;
+    const Frame3 f = SceneBuilder::wallFrame(size_, wall);
+    Frame3 shelf;
+    shelf.origin = f.at(at->x(), at->y(), depth);
+    shelf.axes << f.axes.col(0), -f.axes.col(2), f.axes.col(1);
+    const Surface wood = anyPaint();
+    builder_.addBox(shelf, {0, 0, 0}, {w, depth, thick}, wood);
+    builder_.nextObject();
+    addBooks(shelf, 0.02, w * random_.next(0.4, 0.97), 0.015, depth - 0.04, thick, above - 0.04);
+  }
+
+  void addSwitch(int wall) {
+    const double s = 0.085, thick = 0.012;
+    const auto at = placeOnWall(wall, s, s, thick, random_.nextBool(0.5) ? 0.25 : 1.05, 1.15);
+    if (!at) return;
+    Frame3 f = SceneBuilder::wallFrame(size_, wall);
+    f.origin = f.at(at->x(), at->y(), thick);
+    Panel front = plain(paint(0.7, 0.9));
+    front.pockets.push_back(
+        {0.02, s - 0.02, 0.02, s - 0.02, 0.004, front.surface, plain(near(front.surface, 0.1))});
+    builder_.addSlab(f, s, s, thick, front, front.surface);
+  }
+
+  void addCeilingLamp() {
+    const Vector2d centre{size_.x() * random_.next(0.35, 0.65),
+                          size_.y() * random_.next(0.35, 0.65)};
+    if (random_.nextBool(0.5)) {
+      // A ball on a thin rod.
+      const double r = random_.next(0.1, 0.2), drop = random_.next(0.2, 0.5);
+      const Vector3d ball(centre.x(), centre.y(), size_.z() - drop - r);
+      const Box3 box{ball.array() - r, Vector3d(ball.x() + r, ball.y() + r, size_.z())};
+      if (!isFree(box)) return;
+      taken_.push_back(box);
+      builder_.nextObject();
+      builder_.addRod({centre.x(), centre.y(), ball.z() + r * 0.9},
+                      {centre.x(), centre.y(), size_.z()},
+                      0.005,
+                      8,
+                      paint(0.05, 0.5));
+      builder_.addSphere(ball, r, {0.7, random_.next(0.2, 0.4)});
+      return;
+    }
+    // Flat panels, printed: the ceiling's 2D frame is that of its first corner, e1 along y.
+    const int count = random_.nextInt(1, 3);
+    for (int i = 0; i < count; ++i) {
+      const Vector2d c(size_.y() * (i + 0.5) / count, centre.x());
+      builder_.addDecal(ceiling_,
+                        {DecalShape::kRectangle,
+                         c,
+                         {random_.next(0.1, 0.3), random_.next(0.3, 0.6)},
+                         0,
+                         {0.1, random_.next(0.6, 0.9)}});
+    }
+  }
+
+  void addLights() {
+    Scene& scene = builder_.scene;
+    scene.ambient_up = random_.next(0.22, 0.36);
+    scene.ambient_down = random_.next(0.12, 0.25);
+    Light sun;
+    const double a = random_.next(0, 2 * M_PI);
+    sun.place = Vector3d{std::cos(a), std::sin(a), random_.next(0.3, 1.0)}.normalized();
+    sun.strength = random_.next(0.2, 0.45);
+    scene.lights.push_back(sun);
+    const int lamps = random_.nextInt(1, 2);
+    for (int i = 0; i < lamps; ++i) {
+      Light lamp;
+      lamp.kind = Light::Kind::kPoint;
+      lamp.place = {size_.x() * random_.next(0.2, 0.8),
+                    size_.y() * random_.next(0.2, 0.8),
+                    size_.z() - random_.next(0.15, 0.6)};
+      lamp.strength = random_.next(0.25, 0.55);
+      lamp.half_distance = random_.next(1.5, 4);
+      scene.lights.push_back(lamp);
+    }
+  }
+
+  Pose makePose() {
+    Vector3d position = size_ / 2;
+    // The best of several places: clear of everything, with room ahead.
+    double best = -1;
+    double yaw = 0;
+    for (int attempt = 0; attempt < 60; ++attempt) {
+      const Vector3d p{random_.next(0.4, size_.x() - 0.4),
+                       random_.next(0.4, size_.y() - 0.4),
+                       random_.next(0.8, std::min(2.1, size_.z() - 0.4))};
+      const double y = random_.next(0, 2 * M_PI);
+      double clear = 1;
+      for (const Box3& box : taken_) clear = std::min(clear, box.distanceTo(p));
+      const Vector3d dir(std::cos(y), std::sin(y), 0);
+      double ahead = 10;
+      for (int k = 0; k < 2; ++k) {
+        const double wall = dir[k] > 0 ? size_[k] : 0;
+        if (std::abs(dir[k]) > 1e-6) ahead = std::min(ahead, (wall - p[k]) / dir[k]);
+      }
+      const double score = std::min(clear, 0.4) + 0.1 * std::min(ahead, 2.5);
+      if (score > best) {
+        best = score;
+        position = p;
+        yaw = y;
+        if (clear >= 0.4 && ahead >= 2.5) break;
+      }
+    }
+    const double pitch = random_.next(-0.45, 0.3);
+    const Vector3d dir(
+        std::cos(yaw) * std::cos(pitch), std::sin(yaw) * std::cos(pitch), std::sin(pitch));
+    return lookAt(position, position + dir, random_.next(-0.3, 0.3));
+  }
+
+  Random random_;
+  SceneBuilder builder_;
+  Vector3d size_{0, 0, 0};
+  Surface floor_paint_;
+  int floor_ = -1, ceiling_ = -1;
+  std::array<int, 4> wall_faces_{};
+  bool plain_floor_ = true;
+  double door_lo_ = 0, door_hi_ = 0;
+  std::vector<Box3> taken_;
+};
+
+}  // namespace
+
+SceneView makeRoom(uint64_t seed, uint64_t index) {
+  return RoomMaker(seed, index).make();
+}
+
+}  // namespace dlsd
