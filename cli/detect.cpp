@@ -1,0 +1,169 @@
+#include <fmt/format.h>
+
+#include <CLI/Config.hpp>
+#include <CLI/Formatter.hpp>
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <optional>
+#include <set>
+
+#include "cameras/calibration/calibration.h"
+#include "cameras/calibration/files.h"
+#include "cli/command.h"
+#include "cli/overlay.h"
+#include "detector/detector.h"
+#include "evaluation/detections.h"
+#include "synth/dataset/dataset.h"
+
+namespace dlsd::cli {
+namespace {
+
+struct Arguments {
+  std::string camera, data, out = "-", overlay;
+  std::vector<std::string> images;
+  bool paper = false, time = false;
+};
+
+/// One image to look at: where it is and what its record says.
+struct Task {
+  std::string path;           ///< From here.
+  std::string image, camera;  ///< As in the record.
+};
+
+struct Work {
+  std::vector<Task> tasks;
+  std::map<std::string, Camera> cameras;  ///< By the record's name.
+};
+
+Work workOf(const Arguments& arguments) {
+  Work work;
+  if (!arguments.data.empty()) {
+    if (!arguments.camera.empty() || !arguments.images.empty()) {
+      throw InputError("--data brings its own images and cameras, neither may be given with it");
+    }
+    const Dataset dataset(arguments.data);
+    for (size_t i = 0; i < dataset.size(); ++i) {
+      const LabelRecord record = dataset.labels(i);
+      work.tasks.push_back({arguments.data + "/" + record.image, record.image, record.camera});
+      work.cameras.emplace(record.camera, dataset.camera(record));
+    }
+    return work;
+  }
+  if (arguments.camera.empty() || arguments.images.empty()) {
+    throw InputError("either --camera and images or --data is needed");
+  }
+  work.cameras.emplace(arguments.camera, loadCamera(arguments.camera));
+  for (const std::string& image : arguments.images) {
+    work.tasks.push_back({image, image, arguments.camera});
+  }
+  return work;
+}
+
+std::string overlayPath(const std::string& folder, const Task& task) {
+  return folder + "/" + std::filesystem::path(task.path).stem().string() + ".png";
+}
+
+int run(const Arguments& arguments) {
+  const Work work = workOf(arguments);
+  const bool to_stdout = arguments.out == "-";
+  if (!to_stdout) {
+    checkPlaceForFile(arguments.out);
+  }
+  if (!arguments.overlay.empty()) {
+    std::set<std::string> paths;
+    for (const Task& task : work.tasks) {
+      if (!paths.insert(overlayPath(arguments.overlay, task)).second) {
+        throw InputError("--overlay: two images would be written to " +
+                         overlayPath(arguments.overlay, task));
+      }
+    }
+    makeFolders(arguments.overlay);
+  }
+
+  std::map<std::string, Detector> detectors;
+  for (const auto& [name, camera] : work.cameras) {
+    detectors.emplace(name,
+                      Detector(camera, builtinOptions(arguments.paper ? "dlsd-paper" : "dlsd")));
+  }
+
+  std::string output;
+  std::vector<std::string> complaints;
+  {
+    Progress progress("images", work.tasks.size());
+    for (size_t i = 0; i < work.tasks.size(); ++i) {
+      const Task& task = work.tasks[i];
+      Detector& detector = detectors.at(task.camera);
+      const Camera& camera = detector.camera();
+      try {
+        const Image image = readImage(task.path);
+        if (image.width != camera.width() || image.height != camera.height()) {
+          throw InputError(fmt::format("{}: is {}x{} px, its camera {} is {}x{} px",
+                                       task.path,
+                                       image.width,
+                                       image.height,
+                                       task.camera,
+                                       camera.width(),
+                                       camera.height()));
+        }
+        DetectionRecord record;
+        record.image = task.image;
+        record.camera = task.camera;
+        record.width = image.width;
+        record.height = image.height;
+        record.lines = detectLines(detector, image);
+        if (arguments.time) {
+          record.time_ms = 1000 * detector.times().total;
+        }
+        if (!arguments.overlay.empty()) {
+          writeFileAtomically(overlayPath(arguments.overlay, task),
+                              encodePng(drawOverlay(image, record.lines)));
+        }
+        const std::string line = toJson(record).dump() + "\n";
+        if (to_stdout) {
+          print(line);
+        } else {
+          output += line;
+        }
+      } catch (const InputError& error) {
+        complaints.emplace_back(error.what());
+      }
+      progress.done(i + 1);
+    }
+  }
+  if (!to_stdout && complaints.size() < work.tasks.size()) {
+    writeFileAtomically(arguments.out, output);
+  }
+  for (const std::string& complaint : complaints) {
+    complain(complaint);
+  }
+  return complaints.empty() ? kDone : kBadInput;
+}
+
+}  // namespace
+
+Run addDetect(CLI::App& command) {
+  const auto arguments = std::make_shared<Arguments>();
+  command.add_option(
+      "--camera", arguments->camera, "Calibration file, or file:camera if it holds several");
+  command.add_option("images", arguments->images, "Images, all of the camera's size");
+  command.add_option(
+      "--data", arguments->data, "Dataset: all its images, each with its own camera");
+  command
+      .add_option(
+          "--out", arguments->out, "Detections, one JSON object per line; - is standard output")
+      ->capture_default_str();
+  command.add_flag("--paper", arguments->paper, "The algorithm as published, not the default");
+  command.add_option(
+      "--overlay", arguments->overlay, "Folder for PNG images with the detections drawn on them");
+  command.add_flag(
+      "--time", arguments->time, "Add time_ms: how long detection took, reading apart");
+  command.footer(
+      "Examples:\n"
+      "  dlsd detect --camera wide.yaml frame.png\n"
+      "  dlsd detect --camera rig.yaml:cam0 images/*.png --out det.jsonl --overlay overlays\n"
+      "  dlsd detect --data data --paper --time --out det.jsonl");
+  return [arguments] { return run(*arguments); };
+}
+
+}  // namespace dlsd::cli

@@ -1,0 +1,121 @@
+#include "synth/generate.h"
+
+#include <fmt/format.h>
+
+#include <CLI/Config.hpp>
+#include <CLI/Formatter.hpp>
+#include <charconv>
+#include <filesystem>
+#include <memory>
+#include <set>
+
+#include "cameras/calibration/calibration.h"
+#include "cameras/calibration/files.h"
+#include "cli/command.h"
+
+namespace dlsd::cli {
+namespace {
+
+struct Arguments {
+  std::vector<std::string> cameras;
+  std::string shard = "0/1";
+  std::string encoding = "linear";
+  GenerateOptions options;
+};
+
+/// The name of a camera in the dataset: the file's stem, and the camera's name too if one is
+/// chosen.
+std::string nameOf(const std::string& path_and_camera) {
+  std::error_code ignored;
+  if (std::filesystem::exists(path_and_camera, ignored)) {
+    return std::filesystem::path(path_and_camera).stem().string();
+  }
+  const size_t colon = path_and_camera.rfind(':');
+  return std::filesystem::path(path_and_camera.substr(0, colon)).stem().string() + "-" +
+         path_and_camera.substr(colon + 1);
+}
+
+void readShard(const std::string& text, GenerateOptions* options) {
+  const char* end = text.data() + text.size();
+  const auto index = std::from_chars(text.data(), end, options->shard_index);
+  if (index.ec == std::errc() && index.ptr != end && *index.ptr == '/') {
+    const auto count = std::from_chars(index.ptr + 1, end, options->shard_count);
+    if (count.ec == std::errc() && count.ptr == end) {
+      return;
+    }
+  }
+  throw InputError("--shard is \"" + text + "\", allowed is i/n as in 0/4, with i from 0 to n - 1");
+}
+
+int run(Arguments& arguments) {
+  GenerateOptions& options = arguments.options;
+  std::set<std::string> names;
+  for (const std::string& path : arguments.cameras) {
+    options.cameras.emplace_back(nameOf(path), loadCamera(path));
+    if (!names.insert(options.cameras.back().first).second) {
+      throw InputError("--camera " + path + ": another camera is named \"" +
+                       options.cameras.back().first + "\" too, rename one of the files");
+    }
+  }
+  readShard(arguments.shard, &options);
+  options.sensor.encoding = arguments.encoding == "srgb" ? Encoding::kSrgb : Encoding::kLinear;
+  options.check();
+
+  GenerateResult result{};
+  {
+    Progress progress("frames", size_t(options.count / options.shard_count));
+    result =
+        generateDataset(options, [&](const GenerateProgress& p) { progress.done(size_t(p.done)); });
+  }
+  print(fmt::format("{}: {} frames, {} made now, {} kept\n",
+                    options.out,
+                    result.written + result.kept,
+                    result.written,
+                    result.kept));
+  return kDone;
+}
+
+}  // namespace
+
+Run addGenerate(CLI::App& command) {
+  const auto arguments = std::make_shared<Arguments>();
+  GenerateOptions& options = arguments->options;
+  command
+      .add_option(
+          "--camera",
+          arguments->cameras,
+          "Calibration file, or file:camera if it holds several; may be repeated: frames go "
+          "round")
+      ->required()
+      ->expected(1)
+      ->take_all();
+  command.add_option("--out", options.out, "Folder for the dataset")->required();
+  command.add_option("--scene", options.scene, "Scene preset: room or paper")
+      ->capture_default_str();
+  command.add_option("--count", options.count, "Frames")->capture_default_str();
+  command.add_option("--seed", options.seed, "Seed; the same seed gives the same bytes")
+      ->capture_default_str();
+  command
+      .add_option(
+          "--noise", options.sensor.read_noise_levels, "Noise, standard deviation in grey levels")
+      ->capture_default_str();
+  command
+      .add_option("--psf", options.sensor.psf_sigma_px, "Optical blur, standard deviation in px")
+      ->capture_default_str();
+  command.add_option("--encoding", arguments->encoding, "Light to grey levels: linear or srgb")
+      ->capture_default_str()
+      ->check(CLI::IsMember({"linear", "srgb"}));
+  command.add_option("--jobs", options.jobs, "Threads; 0: one per core")->capture_default_str();
+  command.add_option(
+      "--shard", arguments->shard, "i/n: make only the frames with number mod n = i");
+  command.footer(
+      "Examples:\n"
+      "  dlsd generate --camera wide.yaml --count 100 --out data\n"
+      "  dlsd generate --camera rig.yaml:cam0 --camera rig.yaml:cam1 --scene paper --noise 2 --out "
+      "data\n"
+      "  dlsd generate --camera wide.yaml --count 1000 --shard 0/4 --out data   (and 1/4, 2/4, "
+      "3/4)");
+  return [arguments] { return run(*arguments); };
+}
+
+}  // namespace dlsd::cli
