@@ -1,0 +1,353 @@
+#include "synth/generate.h"
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+#include <tbb/partitioner.h>
+#include <tbb/task_arena.h>
+
+#include <algorithm>
+#include <array>
+#include <cstdio>
+#include <deque>
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <set>
+#include <sstream>
+#include <stdexcept>
+
+#include "cameras/calibration/calibration.h"
+#include "cameras/calibration/files.h"
+#include "synth/dataset/dataset.h"
+#include "synth/dataset/json_fields.h"
+#include "synth/labels.h"
+#include "synth/random.h"
+#include "synth/raycaster.h"
+#include "synth/render.h"
+#include "synth/scene.h"
+#include "synth/shading.h"
+
+namespace dlsd {
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::ordered_json;
+
+constexpr int kMaxCount = 10000000;
+constexpr int kMaxJobs = 1024;
+constexpr uint64_t kSamplingStream = 0x5a3b;
+constexpr std::string_view kVersion = "dlsd " DLSD_VERSION;
+
+[[noreturn]] void refuse(const std::string& field,
+                         const std::string& value,
+                         const std::string& allowed) {
+  throw std::invalid_argument(field + " = " + value + " is out of range: allowed is " + allowed);
+}
+
+void requireInt(const char* field, int value, int lo, int hi) {
+  if (value >= lo && value <= hi) return;
+  std::ostringstream allowed;
+  allowed << '[' << lo << ", " << hi << ']';
+  refuse(field, std::to_string(value), allowed.str());
+}
+
+std::string frameName(uint64_t index) {
+  char name[24];
+  std::snprintf(name, sizeof name, "%06llu", static_cast<unsigned long long>(index));
+  return name;
+}
+std::string imagePath(uint64_t index) {
+  return "images/" + frameName(index) + ".png";
+}
+std::string labelPath(uint64_t index) {
+  return "labels/" + frameName(index) + ".json";
+}
+std::string cameraPath(const std::string& name) {
+  return "cameras/" + name + ".yaml";
+}
+
+/// Ray tables of the cameras used last: a few, so that memory does not grow with their number.
+class RayTables {
+ public:
+  explicit RayTables(const GenerateOptions& options) : options_(options) {}
+
+  std::shared_ptr<const CameraRays> get(size_t camera) {
+    {
+      const std::lock_guard lock(mutex_);
+      for (const Entry& entry : entries_) {
+        if (entry.camera == camera) return entry.rays;
+      }
+    }
+    auto rays = std::make_shared<const CameraRays>(options_.cameras[camera].second);
+    const std::lock_guard lock(mutex_);
+    entries_.push_back({camera, rays});
+    if (entries_.size() > kKept) entries_.pop_front();
+    return rays;
+  }
+
+ private:
+  static constexpr size_t kKept = 8;
+  struct Entry {
+    size_t camera;
+    std::shared_ptr<const CameraRays> rays;
+  };
+  const GenerateOptions& options_;
+  std::mutex mutex_;
+  std::deque<Entry> entries_;
+};
+
+Frame makeFrame(const GenerateOptions& options, uint64_t index, const CameraRays& rays) {
+  const auto& [name, camera] = options.cameras[index % options.cameras.size()];
+  const SceneView view = makeSceneView(options.scene, options.seed, index);
+  const Raycaster raycaster(view.scene);
+  const Shader shader(view.scene);
+  const std::vector<EdgeSpan> spans = visibleSpans(view.scene, raycaster, camera, view.pose);
+  Labels labels =
+      makeLabels(view.scene, raycaster, shader, camera, view.pose, options.sensor, spans);
+
+  Frame frame;
+  frame.radiance = renderRadiance(view.scene,
+                                  raycaster,
+                                  shader,
+                                  rays,
+                                  view.pose,
+                                  spans,
+                                  hashCounters({options.seed, index, kSamplingStream}))
+                       .radiance;
+  blur(options.sensor, camera.width(), camera.height(), &frame.radiance);
+  frame.image = exposeImage(
+      options.sensor, camera.width(), camera.height(), frame.radiance, options.seed, index);
+  LabelRecord& record = frame.labels;
+  record.image = imagePath(index);
+  record.camera = cameraPath(name);
+  record.width = camera.width();
+  record.height = camera.height();
+  record.seed = options.seed;
+  record.index = index;
+  record.cam_from_world = view.pose.matrix();
+  record.sensor = toJson(options.sensor);
+  record.lines = std::move(labels.lines);
+  record.junctions = std::move(labels.junctions);
+  return frame;
+}
+
+ordered_json configJson(const GenerateOptions& options) {
+  ordered_json cameras = ordered_json::array();
+  for (const auto& [name, camera] : options.cameras) {
+    ordered_json params;
+    const auto values = camera.params();
+    const auto specs = camera.paramSpecs();
+    for (size_t i = 0; i < values.size(); ++i) params[std::string(specs[i].name)] = values[i];
+    cameras.push_back({{"name", name},
+                       {"model", camera.modelName()},
+                       {"params", std::move(params)},
+                       {"width", camera.width()},
+                       {"height", camera.height()},
+                       {"max_field_angle", camera.maxFieldAngleLimit()}});
+  }
+  return {{"scene", presetVersion(options.scene)},
+          {"seed", options.seed},
+          {"count", options.count},
+          {"sensor", toJson(options.sensor)},
+          {"cameras", std::move(cameras)}};
+}
+
+struct FrameHashes {
+  std::string image, labels;
+};
+
+/// Frames' hashes by frame index, and what makes a manifest of them.
+struct Manifest {
+  ordered_json config;
+  std::vector<std::pair<std::string, std::string>> cameras;  ///< File and sha256.
+  std::vector<std::pair<uint64_t, FrameHashes>> frames;      ///< By index.
+
+  [[nodiscard]] std::string text() const {
+    ordered_json json{{"format", kDatasetFormat}, {"generator", kVersion}, {"config", config}};
+    json["cameras"] = ordered_json::array();
+    for (const auto& [file, hash] : cameras)
+      json["cameras"].push_back({{"file", file}, {"sha256", hash}});
+    json["frames"] = ordered_json::array();
+    for (const auto& [index, hashes] : frames) {
+      json["frames"].push_back({{"index", index},
+                                {"image", imagePath(index)},
+                                {"image_sha256", hashes.image},
+                                {"labels", labelPath(index)},
+                                {"labels_sha256", hashes.labels}});
+    }
+    return json.dump(1) + "\n";
+  }
+};
+
+std::string manifestName(int shard_index, int shard_count) {
+  if (shard_count == 1) return "manifest.json";
+  return "manifest-" + std::to_string(shard_index) + "-of-" + std::to_string(shard_count) + ".json";
+}
+
+/// The first difference between two configurations, for the refusal.
+std::string difference(const ordered_json& there, const ordered_json& here) {
+  for (const auto& [key, value] : here.items()) {
+    if (!there.contains(key)) return "it has no " + key;
+    if (there[key] != value) {
+      const bool is_short = value.is_primitive();
+      return is_short ? key + " is " + there[key].dump() + " there, " + value.dump() + " here"
+                      : "another " + key;
+    }
+  }
+  return "another configuration";
+}
+
+/// Manifests in the folder; throws InputError if one of them is of another dataset.
+std::map<std::string, Manifest> readManifests(const std::string& folder,
+                                              const ordered_json& config) {
+  std::map<std::string, Manifest> manifests;
+  std::error_code error;
+  for (const auto& entry : fs::directory_iterator(folder, error)) {
+    const std::string name = entry.path().filename().string();
+    if (!name.starts_with("manifest") || !name.ends_with(".json")) continue;
+    const std::string path = folder + "/" + name;
+    const std::string content = readFile(path);
+    const nlohmann::json document = parseJson(content, path);
+    const JsonField json(document, path);
+    const auto refuseFolder = [&](const std::string& why) {
+      throw InputError(folder + " holds another dataset (" + why +
+                       "): choose another folder or delete it");
+    };
+    if (json["format"].text() != kDatasetFormat) refuseFolder("of another format");
+    if (json["generator"].text() != kVersion) {
+      refuseFolder("made by " + json["generator"].text() + ", this is " + std::string(kVersion));
+    }
+    const ordered_json there = json["config"].raw();
+    // Compared as unordered objects: the order of keys means nothing.
+    if (nlohmann::json(there) != nlohmann::json(config)) refuseFolder(difference(there, config));
+    Manifest manifest;
+    manifest.config = config;
+    for (const JsonField& frame : json["frames"].array()) {
+      manifest.frames.push_back({frame["index"].counter(),
+                                 {frame["image_sha256"].text(), frame["labels_sha256"].text()}});
+    }
+    manifests.emplace(name, std::move(manifest));
+  }
+  return manifests;
+}
+
+bool fileHas(const std::string& path, const std::string& sha256) {
+  std::error_code error;
+  return fs::is_regular_file(path, error) && sha256Hex(readFile(path)) == sha256;
+}
+
+}  // namespace
+
+void GenerateOptions::check() const {
+  if (cameras.empty()) throw std::invalid_argument("cameras: at least one is needed");
+  std::set<std::string> names;
+  for (const auto& [name, camera] : cameras) {
+    const bool ok = !name.empty() && std::all_of(name.begin(), name.end(), [](char c) {
+      return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
+             c == '_' || c == '-';
+    });
+    if (!ok) refuse("camera name", "\"" + name + "\"", "letters, digits, '_' and '-'");
+    if (!names.insert(name).second) {
+      throw std::invalid_argument("camera name = \"" + name + "\" is given twice");
+    }
+  }
+  (void)presetVersion(scene);  // Throws for an unknown one.
+  requireInt("count", count, 1, kMaxCount);
+  requireInt("jobs", jobs, 0, kMaxJobs);
+  requireInt("shard_count", shard_count, 1, kMaxCount);
+  requireInt("shard_index", shard_index, 0, shard_count - 1);
+  sensor.check();
+}
+
+Frame renderFrame(const GenerateOptions& options, uint64_t index) {
+  options.check();
+  const CameraRays rays(options.cameras[index % options.cameras.size()].second);
+  return makeFrame(options, index, rays);
+}
+
+GenerateResult generateDataset(const GenerateOptions& options,
+                               const std::function<void(const GenerateProgress&)>& on_progress) {
+  options.check();
+  if (options.out.empty()) throw std::invalid_argument("out: a folder is needed");
+  const ordered_json config = configJson(options);
+  const std::string own_name = manifestName(options.shard_index, options.shard_count);
+  std::map<std::string, Manifest> earlier = readManifests(options.out, config);
+
+  Manifest manifest;
+  manifest.config = config;
+  for (const char* folder : {"images", "labels", "cameras"}) {
+    makeFolders(options.out + "/" + folder);
+  }
+  for (const auto& [name, camera] : options.cameras) {
+    const std::string text = kalibrYaml({{"cam0", camera}});
+    const std::string path = options.out + "/" + cameraPath(name);
+    const std::string hash = sha256Hex(text);
+    if (!fileHas(path, hash)) writeFileAtomically(path, text);
+    manifest.cameras.emplace_back(cameraPath(name), hash);
+  }
+  for (int i = options.shard_index; i < options.count; i += options.shard_count) {
+    manifest.frames.push_back({static_cast<uint64_t>(i), {}});
+  }
+  std::map<uint64_t, FrameHashes> known;
+  for (const auto& [name, old] : earlier) known.insert(old.frames.begin(), old.frames.end());
+
+  RayTables tables(options);
+  std::mutex mutex;
+  GenerateProgress progress{0, static_cast<int>(manifest.frames.size())};
+  GenerateResult result{0, 0};
+  const auto doFrame = [&](std::pair<uint64_t, FrameHashes>* entry) {
+    auto& [index, hashes] = *entry;
+    const std::string image_path = options.out + "/" + imagePath(index);
+    const std::string label_path = options.out + "/" + labelPath(index);
+    const auto old = known.find(index);
+    const bool keep = old != known.end() && fileHas(image_path, old->second.image) &&
+                      fileHas(label_path, old->second.labels);
+    if (keep) {
+      hashes = old->second;
+    } else {
+      const auto rays = tables.get(index % options.cameras.size());
+      const Frame frame = makeFrame(options, index, *rays);
+      const std::string png = encodePng(frame.image);
+      const std::string labels = toJson(frame.labels).dump() + "\n";
+      writeFileAtomically(image_path, png);
+      writeFileAtomically(label_path, labels);
+      hashes = {sha256Hex(png), sha256Hex(labels)};
+    }
+    const std::lock_guard lock(mutex);
+    ++(keep ? result.kept : result.written);
+    ++progress.done;
+    if (on_progress) on_progress(progress);
+  };
+  tbb::task_arena arena(options.jobs == 0 ? tbb::task_arena::automatic : options.jobs);
+  arena.execute([&] {
+    tbb::parallel_for(
+        tbb::blocked_range<size_t>(0, manifest.frames.size(), 1),
+        [&](const tbb::blocked_range<size_t>& range) {
+          for (size_t k = range.begin(); k < range.end(); ++k) doFrame(&manifest.frames[k]);
+        },
+        tbb::simple_partitioner());
+  });
+
+  const std::string own_text = manifest.text();
+  const std::string own_path = options.out + "/" + own_name;
+  if (!fileHas(own_path, sha256Hex(own_text))) writeFileAtomically(own_path, own_text);
+  if (options.shard_count == 1) return result;
+
+  // The last shard to finish finds all manifests and merges them; the bytes are those of one run.
+  earlier = readManifests(options.out, config);
+  Manifest merged{config, manifest.cameras, {}};
+  for (int i = 0; i < options.shard_count; ++i) {
+    const auto it = earlier.find(manifestName(i, options.shard_count));
+    if (it == earlier.end()) return result;
+    merged.frames.insert(merged.frames.end(), it->second.frames.begin(), it->second.frames.end());
+  }
+  std::sort(merged.frames.begin(), merged.frames.end(), [](const auto& a, const auto& b) {
+    return a.first < b.first;
+  });
+  writeFileAtomically(options.out + "/manifest.json", merged.text());
+  return result;
+}
+
+}  // namespace dlsd
