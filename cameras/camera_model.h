@@ -88,17 +88,17 @@ concept CameraModel = std::regular<M> &&
   { m.maxFieldAngle() } -> std::same_as<double>;
 };
 
-/// Jacobian of (fx x s + cx, fy y s + cy), s = rho / r, for a rotationally symmetric rho(r, z),
+/// Jacobian of (fx x s + cx, fy y s + cy), s = rho / r, for a rotationally symmetric rho(r, z) with
 /// r = sqrt(x^2 + y^2). On the axis drho_dr equals s and the direction does not matter.
 [[nodiscard]] inline ProjectionJacobian radialJacobian(
     double fx, double fy, double x, double y, double s, double drho_dr, double drho_dz) {
   const double r = std::hypot(x, y);
   const double ex = r > 0 ? x / r : 1.0;
   const double ey = r > 0 ? y / r : 0.0;
-  const double d = drho_dr - s;
+  const double mixed = (drho_dr - s) * ex * ey;
   ProjectionJacobian J;
-  J << fx * (s + d * ex * ex), fx * d * ex * ey, fx * drho_dz * ex,  //
-      fy * d * ex * ey, fy * (s + d * ey * ey), fy * drho_dz * ey;
+  J << fx * (drho_dr * ex * ex + s * ey * ey), fx * mixed, fx * drho_dz * ex,  //
+      fy * mixed, fy * (drho_dr * ey * ey + s * ex * ex), fy * drho_dz * ey;
   return J;
 }
 

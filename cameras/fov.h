@@ -49,7 +49,8 @@ struct Fov {
     const T scale = r > T(0) ? alpha / (T(omega) * r) : T(two_tan_half_omega / omega) / z;
     const T u = T(fx) * (x * scale) + T(cx);
     const T v = T(fy) * (y * scale) + T(cy);
-    return {u, v, alpha < T(M_PI) && size_ok && pixelInRange(u, v)};
+    // Not alpha < pi: for small omega alpha rounds to pi while the ray is still far from -z.
+    return {u, v, (r > T(0) || z > T(0)) && size_ok && pixelInRange(u, v)};
   }
 
   template <class T>
@@ -72,7 +73,7 @@ struct Fov {
   }
 
   [[nodiscard]] ProjectionJacobian jacobian(double x, double y, double z) const {
-    const double r = std::hypot(x, y);
+    const double r = std::sqrt(x * x + y * y);  // 0 where project takes its limit, too.
     if (omega < kPinholeOmega) return radialJacobian(fx, fy, x, y, 1 / z, 1 / z, -r / (z * z));
     const double k = two_tan_half_omega;
     const double denom = omega * (k * k * r * r + z * z);

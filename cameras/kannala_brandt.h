@@ -101,7 +101,7 @@ struct KannalaBrandt {
   }
 
   [[nodiscard]] ProjectionJacobian jacobian(double x, double y, double z) const {
-    const double r = std::hypot(x, y);
+    const double r = std::sqrt(x * x + y * y);  // 0 where project takes its limit, too.
     const double theta = std::atan2(r, z);
     const double slope = distortSlope(theta) / (r * r + z * z);
     const double s = r > 0 ? distort(theta) / r : 1 / z;

@@ -1,0 +1,792 @@
+// What must hold for every camera model. Typed over the alternatives of CameraModelVariant: a new
+// model is tested by adding its name there (and its equation in oracle.h). Each case draws one
+// camera and many rays or pixels; the worst errors seen are printed in units of what is allowed.
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Geometry>
+#include <Eigen/SVD>
+#include <array>
+#include <cmath>
+#include <functional>
+#include <iomanip>
+#include <iostream>
+#include <limits>
+#include <map>
+#include <sstream>
+#include <string>
+
+#include "cameras/arc.h"
+#include "cameras/batch.h"
+#include "cameras/calibration/calibration.h"
+#include "cameras/calibration/files.h"
+#include "properties/gen.h"
+#include "properties/oracle.h"
+#ifdef DLSD_HAVE_CALIB3D
+#include <opencv2/calib3d.hpp>
+#endif
+#ifdef DLSD_HAVE_CCALIB
+#include <opencv2/ccalib/omnidir.hpp>
+#endif
+
+namespace dlsd {
+namespace {
+
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+
+// --- Tolerances, all in one place
+// ---------------------------------------------------------------------
+
+/// pixel -> ray -> pixel inside the image, px.
+constexpr double kPixelRoundTrip = 1e-10;
+/// ray -> pixel -> ray, in ulps of the largest of |u|, |v|, |cx|, |cy| over the smallest singular
+/// value of the projection's Jacobian: what the pixel's own resolution allows.
+constexpr double kRayRoundTripUlps = 8;
+/// Resolution of a unit ray's own coordinates, added where the pixel is outside the image: far out,
+/// a pixel can be finer than any double ray.
+constexpr double kRayResolution = 2 * std::numeric_limits<double>::epsilon();
+/// Relative band at the bounds of the domain inside which either answer is right.
+constexpr double kBand = 1e-12;
+/// Number of rays or pixels drawn for each camera.
+constexpr size_t kMany = 64;
+
+// --- Helpers
+// ------------------------------------------------------------------------------------------
+
+double ulp(double x) {
+  x = std::abs(x);
+  return std::nextafter(x, std::numeric_limits<double>::infinity()) - x;
+}
+
+double pixelUlp(const Camera& camera, const Vector2d& pixel) {
+  return ulp(std::max(pixel.cwiseAbs().maxCoeff(), principalPoint(camera).cwiseAbs().maxCoeff()));
+}
+
+double fieldAngle(const Vector3d& ray) {
+  return std::atan2(std::hypot(ray.x(), ray.y()), ray.z());
+}
+
+double angleBetween(const Vector3d& a, const Vector3d& b) {
+  return std::atan2(a.cross(b).norm(), a.dot(b));
+}
+
+struct Singular {
+  double largest, smallest;
+};
+Singular singularValues(const ProjectionJacobian& J) {
+  const Eigen::JacobiSVD<ProjectionJacobian> svd(J);
+  return {svd.singularValues()(0), svd.singularValues()(1)};
+}
+
+/// Many draws of one generator. Only cameras shrink, and failures name the one ray or pixel:
+/// shrinking and printing all of them takes longer than it helps.
+template <class T>
+struct Batch {
+  std::vector<T> values;
+};
+template <class T>
+void showValue(const Batch<T>& batch, std::ostream& out) {
+  out << batch.values.size() << " draws";
+}
+template <class T>
+std::vector<T> draw(size_t count, const rc::Gen<T>& gen) {
+  return (*rc::gen::noShrink(
+              rc::gen::map(rc::gen::container<std::vector<T>>(count, gen),
+                           [](std::vector<T> values) { return Batch<T>{std::move(values)}; })))
+      .values;
+}
+template <class T>
+std::vector<T> many(const rc::Gen<T>& gen) {
+  return draw(kMany, gen);
+}
+
+/// What a pixel's offset from the principal point, in units of the focal lengths, loses to rounding
+/// relative to its length: not the model's doing.
+double offsetRounding(const Camera& camera, const Vector2d& pixel) {
+  const Vector2d f = focalLengths(camera), c = principalPoint(camera);
+  const Vector2d offset = (pixel - c).cwiseQuotient(f);
+  double rounding = 0;
+  for (int i = 0; i < 2; ++i) {
+    rounding = std::max(rounding, ulp(std::max(std::abs(pixel[i]), std::abs(c[i]))) / f[i]);
+  }
+  return 4 * rounding / offset.norm();
+}
+
+/// The pixel moved towards the principal point, out of the band in which validity is up to
+/// rounding.
+Vector2d pulledIn(const Camera& camera, const Vector2d& pixel) {
+  const double share = kBand + offsetRounding(camera, pixel);
+  const Vector2d c = principalPoint(camera);
+  return share < 1 ? Vector2d(c + (pixel - c) * (1 - share)) : c;
+}
+
+std::string describe(const Camera& camera, const Vector3d& ray) {
+  std::ostringstream text;
+  text << std::setprecision(17) << camera << ", ray " << ray.transpose() << " at "
+       << fieldAngle(ray) << " rad of " << camera.maxFieldAngle();
+  return text.str();
+}
+std::string describe(const Camera& camera, const Vector2d& pixel) {
+  std::ostringstream text;
+  text << std::setprecision(17) << camera << ", pixel " << pixel.transpose();
+  return text.str();
+}
+
+/// Worst value of a property, printed when its test ends. Not kept while RapidCheck shrinks a
+/// failure, which it does only after the worst has been seen.
+class Worst {
+ public:
+  explicit Worst(std::string what) : what_(std::move(what)) {}
+  ~Worst() {
+    std::ostringstream text;
+    text << std::setprecision(3) << value_ << " (of " << count_ << ")";
+    ::testing::Test::RecordProperty("worst", text.str());
+    std::cout << "    worst " << what_ << ": " << text.str() << "\n";
+  }
+  Worst(const Worst&) = delete;
+  Worst& operator=(const Worst&) = delete;
+  void see(double value) {
+    ++count_;
+    if (!(value <= value_)) value_ = value;
+  }
+  [[nodiscard]] long count() const { return count_; }
+
+ private:
+  std::string what_;
+  double value_ = 0;
+  long count_ = 0;
+};
+
+/// Runs a property and demands that it was really tried: `tried` items per successful case at
+/// least.
+template <class Property>
+void holds(const Property& property) {
+  EXPECT_TRUE(rc::check(property)) << "see the counterexample above";
+}
+
+template <class M>
+const M& modelOf(const Camera& camera) {
+  return std::get<M>(camera.model());
+}
+
+template <class V>
+struct AsTestTypes;
+template <class... Ms>
+struct AsTestTypes<std::variant<Ms...>> {
+  using type = ::testing::Types<Ms...>;
+};
+struct ModelName {
+  template <class M>
+  static std::string GetName(int) {
+    return std::string(M::kName);
+  }
+};
+
+template <class M>
+class CameraSuite : public ::testing::Test {};
+TYPED_TEST_SUITE(CameraSuite, AsTestTypes<CameraModelVariant>::type, ModelName);
+
+Range drawRange() {
+  const int kind = *genInt(0, 2);
+  RC_CLASSIFY(kind == 2, "admissible");
+  return kind == 2 ? Range::kAdmissible : Range::kRealistic;
+}
+
+// --- Round trips
+// --------------------------------------------------------------------------------------
+
+TYPED_TEST(CameraSuite, PixelsInsideTheImageComeBack) {
+  Worst worst("pixel -> ray -> pixel, in units of 1e-10 px");
+  long seen = 0, drawn = 0;
+  holds([&] {
+    const Camera camera = *genCamera<TypeParam>(Range::kRealistic);
+    for (const Vector2d& pixel :
+         many(rc::gen::oneOf(genPixelInImage(camera), genPixelOnBorder(camera)))) {
+      ++drawn;
+      const auto ray = camera.unproject(pixel);
+      if (!ray) continue;
+      ++seen;
+      const auto back = camera.project(*ray);
+      if (!back) {
+        // Only where the pixel is within rounding of the rim.
+        if (camera.project(*camera.unproject(pulledIn(camera, pixel)))) continue;
+        RC_FAIL("no way back: " + describe(camera, pixel));
+      }
+      const double error = (*back - pixel).norm();
+      worst.see(error / kPixelRoundTrip);
+      if (!(error <= kPixelRoundTrip)) RC_FAIL(describe(camera, pixel));
+    }
+  });
+  EXPECT_GE(seen, drawn * 6 / 10);
+  EXPECT_GE(worst.count(), seen * 99 / 100);
+}
+
+TYPED_TEST(CameraSuite, RaysComeBack) {
+  Worst worst("ray -> pixel -> ray, in units of 8 ulp(px) / smallest singular value");
+  Worst worst_far("the same outside the image or in odd cameras, plus the resolution of a ray");
+  holds([&] {
+    const Range range = drawRange();
+    const Camera camera = *genCamera<TypeParam>(range);
+    for (const Vector3d& ray : many(genRayFor(camera))) {
+      const auto pixel = camera.project(ray);
+      if (!pixel) continue;
+      const auto back = camera.unproject(*pixel);
+      if (!back) continue;  // ValidOneWayImpliesValidBack looks at these.
+      // Where either answer is right, neither is measured: at -z the Jacobian is not even finite.
+      if (!(fieldAngle(ray) < camera.maxFieldAngle() * (1 - kBand))) continue;
+      const double smallest = singularValues(*camera.jacobian(ray)).smallest;
+      const double error = angleBetween(ray, *back);
+      double allowed = kRayRoundTripUlps * pixelUlp(camera, *pixel) / smallest;
+      const bool ordinary = range == Range::kRealistic && camera.inImage(*pixel);
+      if (!ordinary) allowed += kRayResolution;
+      (ordinary ? worst : worst_far).see(error / allowed);
+      if (!(error <= allowed)) {
+        std::ostringstream text;
+        text << error << " > " << allowed << ": ";
+        RC_FAIL(text.str() + describe(camera, ray));
+      }
+    }
+  });
+  EXPECT_GT(worst.count(), 1000);
+  EXPECT_GT(worst_far.count(), 1000);
+}
+
+// --- Validity
+// -----------------------------------------------------------------------------------------
+
+TYPED_TEST(CameraSuite, ValidOneWayImpliesValidBack) {
+  long rays = 0, pixels = 0;
+  holds([&] {
+    const Camera camera = *genCamera<TypeParam>(drawRange());
+    for (const Vector3d& ray : many(genRayFor(camera))) {
+      const auto pixel = camera.project(ray);
+      if (!pixel) continue;
+      ++rays;
+      // At a fold, the pixel is within rounding of the bound long before the ray is.
+      if (!camera.unproject(*pixel) && !camera.unproject(pulledIn(camera, *pixel))) {
+        RC_FAIL(describe(camera, ray));
+      }
+    }
+    for (const Vector2d& pixel : many(genPixelFor(camera))) {
+      const auto ray = camera.unproject(pixel);
+      if (!ray) continue;
+      ++pixels;
+      if (!camera.project(*ray)) {
+        const auto inner = camera.unproject(pulledIn(camera, pixel));
+        if (!inner || !camera.project(*inner)) RC_FAIL(describe(camera, pixel));
+      }
+    }
+  });
+  EXPECT_GT(rays, 2000);
+  EXPECT_GT(pixels, 2000);
+}
+
+TYPED_TEST(CameraSuite, RaysAreValidExactlyInsideTheDomain) {
+  long inside = 0, outside = 0;
+  holds([&] {
+    const Camera camera = *genCamera<TypeParam>(drawRange());
+    const auto& model = modelOf<TypeParam>(camera);
+    const auto limit = static_cast<long double>(camera.maxFieldAngleLimit());
+    const long double bound = std::min(oracleMaxFieldAngle(model), limit);
+    const double uncertainty = oracleBoundUncertainty(model);
+    const auto band = static_cast<long double>(std::max(kBand, uncertainty));
+    RC_ASSERT(std::abs(static_cast<double>(camera.maxFieldAngle() / bound - 1)) <= uncertainty);
+    for (const Vector3d& ray : many(rc::gen::oneOf(genRayFor(camera), genRayNearBound(camera)))) {
+      const long double theta = std::atan2(
+          std::hypot(static_cast<long double>(ray.x()), static_cast<long double>(ray.y())),
+          static_cast<long double>(ray.z()));
+      const bool valid = camera.project(ray).has_value();
+      if (theta > bound * (1 + band)) {
+        ++outside;
+        if (valid) RC_FAIL("valid outside the domain: " + describe(camera, ray));
+      } else if (theta < bound * (1 - band)) {
+        const auto p = oracleProject(model, ray.x(), ray.y(), ray.z());
+        RC_ASSERT(p.has_value());
+        const auto size = static_cast<double>(std::max(std::abs((*p)[0]), std::abs((*p)[1])));
+        if (size > kMaxPixel * (1 + kBand)) {
+          if (valid) RC_FAIL("valid beyond the largest pixel: " + describe(camera, ray));
+        } else if (size < kMaxPixel * (1 - kBand)) {
+          ++inside;
+          if (!valid) RC_FAIL("not valid inside the domain: " + describe(camera, ray));
+        }
+      }
+    }
+  });
+  EXPECT_GT(inside, 3000);
+  EXPECT_GT(outside, 500);
+}
+
+TYPED_TEST(CameraSuite, PixelsAreValidExactlyInsideTheDomain) {
+  long inside = 0, outside = 0;
+  holds([&] {
+    const Camera drawn = *genCamera<TypeParam>(drawRange());
+    // The limit of the field angle is a bound on rays; here it is the model's own bound that
+    // counts.
+    const Camera camera(drawn.model(), drawn.width(), drawn.height());
+    const auto& model = modelOf<TypeParam>(camera);
+    const long double bound = oracleMaxRadius(model);
+    for (const Vector2d& pixel :
+         many(rc::gen::oneOf(genPixelFor(camera), genPixelNearBound(camera)))) {
+      const double size = pixel.cwiseAbs().maxCoeff();
+      const long double radius =
+          std::hypot((static_cast<long double>(pixel.x()) - model.cx) / model.fx,
+                     (static_cast<long double>(pixel.y()) - model.cy) / model.fy);
+      const long double band = kBand + offsetRounding(camera, pixel);
+      const bool valid = camera.unproject(pixel).has_value();
+      if (radius > bound * (1 + band) || size > kMaxPixel) {
+        ++outside;
+        if (valid) RC_FAIL("valid outside the domain: " + describe(camera, pixel));
+      } else if (radius < bound * (1 - band)) {
+        ++inside;
+        if (!valid) RC_FAIL("not valid inside the domain: " + describe(camera, pixel));
+      }
+    }
+  });
+  EXPECT_GT(inside, 2000);
+  EXPECT_GT(outside, 50);
+}
+
+TYPED_TEST(CameraSuite, ValidImpliesFiniteAndUnit) {
+  constexpr double kInf = std::numeric_limits<double>::infinity();
+  constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+  const std::vector<double> hostile{0.0,    -0.0,   kNan,   kInf,    -kInf, 1.0,   -1.0,    5e-324,
+                                    1e-300, 1e-160, 1e-100, -1e-100, 1e100, 1e160, 1.7e308, 1e9,
+                                    1e-9,   -1e9,   1e-17,  -1e-17,  1e-8,  640.0};
+  Worst worst("| |ray| - 1 |, in ulp(1)");
+  long accepted = 0;
+  holds([&] {
+    const Camera camera = *genCamera<TypeParam>(drawRange());
+    const auto checkRay = [&](const Vector3d& ray) {
+      const auto pixel = camera.project(ray);
+      const auto J = camera.jacobian(ray);
+      if (pixel.has_value() != J.has_value()) RC_FAIL("jacobian: " + describe(camera, ray));
+      if (!pixel) return;
+      ++accepted;
+      if (!pixel->allFinite() || !J->allFinite() || !ray.allFinite()) {
+        RC_FAIL(describe(camera, ray));
+      }
+    };
+    const auto checkPixel = [&](const Vector2d& pixel) {
+      const auto ray = camera.unproject(pixel);
+      if (!ray) return;
+      ++accepted;
+      const double off = std::abs(ray->norm() - 1);
+      worst.see(off / std::numeric_limits<double>::epsilon());
+      if (!pixel.allFinite() || !(off <= 4 * std::numeric_limits<double>::epsilon())) {
+        RC_FAIL(describe(camera, pixel));
+      }
+    };
+    const auto special = draw(3 * kMany, rc::gen::elementOf(hostile));
+    for (size_t i = 0; i < special.size(); i += 3) {
+      checkRay({special[i], special[i + 1], special[i + 2]});
+      checkPixel({special[i], special[i + 1]});
+    }
+    for (const Vector3d& ray : many(genRayFor(camera))) checkRay(ray);
+    for (const Vector2d& pixel : many(genPixelFor(camera))) checkPixel(pixel);
+  });
+  EXPECT_GT(accepted, 5000);
+  const Camera camera = makeCamera(TypeParam::kName, TypeParam().params(), 10, 10);
+  for (const double bad : {kNan, kInf, -kInf}) {
+    EXPECT_FALSE(camera.project({bad, 0, 1}));
+    EXPECT_FALSE(camera.project({0, bad, 1}));
+    EXPECT_FALSE(camera.project({0, 0, bad}));
+    EXPECT_FALSE(camera.unproject({bad, 0}));
+    EXPECT_FALSE(camera.unproject({0, bad}));
+  }
+  EXPECT_FALSE(camera.project({0, 0, 0}));
+  EXPECT_FALSE(camera.project({0, 0, -0.0}));
+}
+
+TYPED_TEST(CameraSuite, TheLengthOfARayDoesNotMatter) {
+  Worst worst("difference, in units of 8 ulp(px) + largest singular value * ray resolution");
+  holds([&] {
+    const Camera camera = *genCamera<TypeParam>(drawRange());
+    const double scale = *genLogReal(1e-95, 1e95);
+    for (const Vector3d& ray : many(genRayFor(camera))) {
+      const auto a = camera.project(ray), b = camera.project(scale * ray);
+      if (a.has_value() != b.has_value()) {
+        const double off = std::abs(fieldAngle(ray) / camera.maxFieldAngle() - 1);
+        const double size = (a ? *a : *b).cwiseAbs().maxCoeff();
+        if (!(off <= kBand) && !(size > kMaxPixel * (1 - 1e-6))) RC_FAIL(describe(camera, ray));
+      }
+      if (!a || !b) continue;
+      const double largest = singularValues(*camera.jacobian(ray)).largest;
+      const double allowed = 8 * pixelUlp(camera, *a) + largest * kRayResolution;
+      worst.see((*a - *b).norm() / allowed);
+      if (!((*a - *b).norm() <= allowed)) RC_FAIL(describe(camera, ray));
+    }
+  });
+  EXPECT_GT(worst.count(), 2000);
+}
+
+// --- Right
+// --------------------------------------------------------------------------------------------
+
+TYPED_TEST(CameraSuite, AgreesWithTheTextbookInLongDouble) {
+  Worst worst("difference, in units of 8 ulp(px) + largest singular value * ray resolution");
+  holds([&] {
+    const Camera camera = *genCamera<TypeParam>(drawRange());
+    const auto& model = modelOf<TypeParam>(camera);
+    for (const Vector3d& ray : many(genRayFor(camera))) {
+      const auto pixel = camera.project(ray);
+      const auto exact = oracleProject(model, ray.x(), ray.y(), ray.z());
+      if (!pixel || !exact) continue;
+      const double error = std::hypot(static_cast<double>(pixel->x() - (*exact)[0]),
+                                      static_cast<double>(pixel->y() - (*exact)[1]));
+      const double largest = singularValues(*camera.jacobian(ray)).largest;
+      const double allowed = 8 * pixelUlp(camera, *pixel) + largest * kRayResolution;
+      worst.see(error / allowed);
+      if (!(error <= allowed)) RC_FAIL(describe(camera, ray));
+    }
+  });
+  EXPECT_GT(worst.count(), 2000);
+}
+
+TYPED_TEST(CameraSuite, TheJacobianIsTheDerivative) {
+  Worst worst("against central differences, in units of 1e-8 |J| + rounding");
+  Worst euler("|J ray| / |J|, in ulp(1)");
+  holds([&] {
+    const Camera camera = *genCamera<TypeParam>(drawRange());
+    // Differences do not see the principal point, but its size costs them digits.
+    TypeParam model = modelOf<TypeParam>(camera);
+    model.cx = model.cy = 0;
+    for (const Vector3d& ray : many(genRayFor(camera))) {
+      const auto J = camera.jacobian(ray);
+      if (!J) continue;
+      // Projection does not depend on the length of a ray, so it is homogeneous of degree 0.
+      const double along = (*J * ray).norm() / J->norm();
+      euler.see(along / std::numeric_limits<double>::epsilon());
+      if (!(along <= 8 * std::numeric_limits<double>::epsilon())) {
+        RC_FAIL("Euler: " + describe(camera, ray));
+      }
+      // Step well inside the distances over which models change: to the bound, to the plane of the
+      // image, and to -z.
+      const double theta = fieldAngle(ray);
+      const double room =
+          std::min({1.0,
+                    std::abs(static_cast<double>(oracleMaxFieldAngle(model)) - theta),
+                    std::abs(M_PI / 2 - theta),
+                    M_PI - theta});
+      const double h = 1e-6 * room;
+      if (!(h > 1e-10)) continue;
+      Eigen::Matrix<double, 2, 3> numeric;
+      bool complete = true;
+      for (int i = 0; i < 3; ++i) {
+        std::array<long double, 3> a{ray.x(), ray.y(), ray.z()}, b = a;
+        a[static_cast<size_t>(i)] += h;
+        b[static_cast<size_t>(i)] -= h;
+        const auto pa = oracleProject(model, a[0], a[1], a[2]);
+        const auto pb = oracleProject(model, b[0], b[1], b[2]);
+        complete = complete && pa && pb;
+        if (!complete) break;
+        for (int k = 0; k < 2; ++k) {
+          const auto row = static_cast<size_t>(k);
+          numeric(k, i) = static_cast<double>(((*pa)[row] - (*pb)[row]) / (2.0L * h));
+        }
+      }
+      if (!complete) continue;
+      // The second term is what the difference of two long doubles of this size loses.
+      const auto p = oracleProject(model, ray.x(), ray.y(), ray.z());
+      RC_ASSERT(p.has_value());
+      const auto size = static_cast<double>(std::max(std::abs((*p)[0]), std::abs((*p)[1])));
+      const double error = (numeric - *J).norm();
+      const double allowed = 1e-8 * J->norm() + 1e-18 * size / h;
+      worst.see(error / allowed);
+      if (!(error <= allowed)) RC_FAIL(describe(camera, ray));
+    }
+  });
+  EXPECT_GT(euler.count(), 2000);
+  EXPECT_GT(worst.count(), 1000);
+}
+
+TYPED_TEST(CameraSuite, TheImageIsContinuousAcrossTheAxis) {
+  Worst worst("deviation from J * offset, in units of 4 ulp(px)");
+  holds([&] {
+    const Camera camera = *genCamera<TypeParam>(drawRange());
+    const Vector2d centre = principalPoint(camera);
+    const auto axis = camera.project({0, 0, 1});
+    RC_ASSERT(axis.has_value());
+    RC_ASSERT(*axis == centre);
+    const auto J = camera.jacobian({0, 0, 1});
+    RC_ASSERT(J.has_value());
+    for (const Vector3d& ray : many(genRayAt(
+             rc::gen::map(genReal(9, 320), [](double k) { return std::pow(10.0, -k); })))) {
+      // Beyond 1e-9 rad the second order shows in the tolerance for some admissible camera.
+      const double angle = fieldAngle(ray);
+      const auto pixel = camera.project(ray);
+      RC_ASSERT(pixel.has_value());
+      const double off = (*pixel - centre - *J * Vector3d(ray.x(), ray.y(), 0)).norm();
+      const double allowed = 4 * pixelUlp(camera, *pixel) + 1e-15 * J->norm() * angle;
+      worst.see(off / allowed);
+      if (!(off <= allowed)) RC_FAIL(describe(camera, ray));
+
+      const Vector2d near = centre + *J * Vector3d(ray.x(), ray.y(), 0);
+      const auto back = camera.unproject(near);
+      RC_ASSERT(back.has_value());
+      const double smallest = singularValues(*J).smallest;
+      if (!((*back - Vector3d(ray.x(), ray.y(), 1)).norm() <=
+            8 * pixelUlp(camera, near) / smallest + 1e-15 * angle)) {
+        RC_FAIL("unproject: " + describe(camera, ray));
+      }
+    }
+  });
+  EXPECT_GT(worst.count(), 5000);
+}
+
+// --- Batches, files, arcs
+// -----------------------------------------------------------------------------
+
+TYPED_TEST(CameraSuite, BatchesEqualSinglePoints) {
+  long compared = 0;
+  holds([&] {
+    const Camera camera = *genCamera<TypeParam>(drawRange());
+    const size_t n = *rc::gen::elementOf(std::vector<size_t>{0, 1, 2, 3, 4, 5, 7, 8, 9, 31, 64});
+    const auto rays = draw(n, genRayFor(camera));
+    const auto pixels = draw(n, genPixelFor(camera));
+    std::vector<double> x(n), y(n), z(n), u(n), v(n);
+    std::vector<uint8_t> valid(n, 7);
+    for (size_t i = 0; i < n; ++i) {
+      x[i] = rays[i].x();
+      y[i] = rays[i].y();
+      z[i] = rays[i].z();
+    }
+    projectAll(camera, x, y, z, u, v, valid);
+    for (size_t i = 0; i < n; ++i) {
+      ++compared;
+      const auto pixel = camera.project(rays[i]);
+      RC_ASSERT(valid[i] == (pixel ? 1 : 0));
+      if (pixel) RC_ASSERT(*pixel == Vector2d(u[i], v[i]));
+    }
+    for (size_t i = 0; i < n; ++i) {
+      u[i] = pixels[i].x();
+      v[i] = pixels[i].y();
+    }
+    unprojectAll(camera, u, v, x, y, z, valid);
+    for (size_t i = 0; i < n; ++i) {
+      const auto ray = camera.unproject(pixels[i]);
+      RC_ASSERT(valid[i] == (ray ? 1 : 0));
+      if (ray) RC_ASSERT(*ray == Vector3d(x[i], y[i], z[i]));
+    }
+  });
+  EXPECT_GT(compared, 100);
+}
+
+TYPED_TEST(CameraSuite, KalibrFilesGiveBackTheSameCamera) {
+  const std::string path =
+      ::testing::TempDir() + "dlsd_camera_suite_" + std::string(TypeParam::kName) + ".yaml";
+  holds([&] {
+    const Camera a = *genCamera<TypeParam>(drawRange());
+    const Camera b = *genAnyCamera(Range::kAdmissible);
+    saveCameras(path, {{"cam0", a}, {"cam1", b}});
+    const auto read = loadCameras(path);
+    RC_ASSERT(read.size() == 2U);
+    RC_ASSERT(read[0].camera == a);
+    RC_ASSERT(read[1].camera == b);
+    RC_ASSERT(loadCamera(path + ":cam1") == b);
+  });
+  std::remove(path.c_str());
+}
+
+Arc drawArc(const Camera& camera) {
+  for (;;) {
+    // A short arc across the view, or any.
+    const bool local = *genInt(0, 3) < 2;
+    const Vector3d from = *genRayFor(camera);
+    Vector3d to = *genRayFor(camera);
+    if (local) to = (from + 0.7 * to.normalized()).normalized();
+    if (const auto arc = arcBetween(from, to)) return *arc;
+  }
+}
+
+double distanceToSegment(const Vector2d& p, const Vector2d& a, const Vector2d& b) {
+  const double length2 = (b - a).squaredNorm();
+  const double t = length2 > 0 ? std::clamp((p - a).dot(b - a) / length2, 0.0, 1.0) : 0.0;
+  return (p - a - t * (b - a)).norm();
+}
+
+TYPED_TEST(CameraSuite, TheImageOfAPlaneStaysOnItsArc) {
+  Worst worst(
+      "angle to the plane, in units of 8 ulp(px) / smallest singular value + ray resolution");
+  Worst chord("distance of the curve to its chords, in units of 0.01 px");
+  long samples = 0;
+  holds([&] {
+    const Camera camera = *genCamera<TypeParam>(Range::kRealistic);
+    for (int n = 0; n < 4; ++n) {
+      const Arc arc = drawArc(camera);
+      for (const ImageSpan& span : imageSpans(camera, arc)) {
+        const auto points = imageCurve(camera, arc, span.t0, span.t1);
+        for (size_t k = 0; k < points.size(); ++k) {
+          const auto ray = camera.unproject(points[k]);
+          if (!ray) continue;  // Within rounding of the rim.
+          const auto J = camera.jacobian(*ray);
+          if (!J) continue;
+          const double smallest = singularValues(*J).smallest;
+          const double allowed = 8 * pixelUlp(camera, points[k]) / smallest + 2 * kRayResolution;
+          const double off = std::abs(arc.angleToPlane(*ray));
+          worst.see(off / allowed);
+          if (!(off <= allowed)) RC_FAIL(describe(camera, points[k]));
+        }
+        RC_ASSERT(points.size() >= 2U);
+        // Densely sampled, the curve is nowhere further from its chords than was asked for.
+        constexpr int kSamples = 300;
+        for (int i = 0; i <= kSamples; ++i) {
+          const auto p = camera.project(arc.at(span.t0 + (span.t1 - span.t0) * i / kSamples));
+          if (!p) continue;
+          double nearest = std::numeric_limits<double>::infinity();
+          for (size_t k = 1; k < points.size(); ++k) {
+            nearest = std::min(nearest, distanceToSegment(*p, points[k - 1], points[k]));
+          }
+          ++samples;
+          chord.see(nearest / 0.01);
+          if (!(nearest <= 0.0105)) RC_FAIL("chord: " + describe(camera, *p));
+        }
+      }
+    }
+  });
+  EXPECT_GT(worst.count(), 2000);
+  EXPECT_GT(samples, 20000);
+}
+
+TYPED_TEST(CameraSuite, SpansAreThoseOfADenseSampling) {
+  long spans_seen = 0, with_gap = 0, rims = 0;
+  holds([&] {
+    const Camera camera = *genCamera<TypeParam>(Range::kRealistic);
+    const Arc arc = drawArc(camera);
+    const auto spans = imageSpans(camera, arc);
+    spans_seen += static_cast<long>(spans.size());
+    with_gap += static_cast<long>(spans.size() > 1);
+    double previous = -1;
+    for (const ImageSpan& span : spans) {
+      RC_ASSERT(span.t0 > previous);
+      RC_ASSERT(span.t1 >= span.t0);
+      RC_ASSERT((span.end0 == ImageEnd::kArcEnd) == (span.t0 == 0));
+      RC_ASSERT((span.end1 == ImageEnd::kArcEnd) == (span.t1 == 1));
+      rims += static_cast<long>(span.end0 == ImageEnd::kRim) +
+              static_cast<long>(span.end1 == ImageEnd::kRim);
+      previous = span.t1;
+    }
+    const auto inSpan = [&](double t) {
+      return std::any_of(spans.begin(), spans.end(), [&](const ImageSpan& s) {
+        return t >= s.t0 - 1e-12 && t <= s.t1 + 1e-12;
+      });
+    };
+    const auto imaged = [&](double t) {
+      const auto pixel = camera.project(arc.at(t));
+      return pixel && camera.inImage(*pixel);
+    };
+    // Steps of 0.02 degrees; a run of wrong answers longer than 0.1 degrees is a missed piece or
+    // gap.
+    const int count = static_cast<int>(std::ceil(arc.angle() / (0.02 * M_PI / 180))) + 1;
+    int wrong = 0;
+    for (int i = 0; i <= count; ++i) {
+      const double t = static_cast<double>(i) / count;
+      wrong = imaged(t) == inSpan(t) ? 0 : wrong + 1;
+      if (wrong > 6) {
+        std::ostringstream text;
+        text << std::setprecision(17) << camera << " from " << arc.from.transpose() << " to "
+             << arc.to.transpose() << " at " << t;
+        RC_FAIL(text.str());
+      }
+    }
+    // Ends are where they are said to be.
+    for (const ImageSpan& span : spans) {
+      RC_ASSERT(imaged(span.t0));
+      RC_ASSERT(imaged(span.t1));
+      if (span.end0 != ImageEnd::kArcEnd) RC_ASSERT(!imaged(span.t0 - 2e-13));
+      if (span.end1 != ImageEnd::kArcEnd) RC_ASSERT(!imaged(span.t1 + 2e-13));
+    }
+  });
+  EXPECT_GT(spans_seen, 60);
+  std::cout << "    spans " << spans_seen << ", arcs with a gap " << with_gap
+            << ", ends at the rim " << rims << "\n";
+}
+
+// --- OpenCV
+// -------------------------------------------------------------------------------------------
+
+/// Rays of an image's pixels within an angle of the axis, as OpenCV points.
+#if defined(DLSD_HAVE_CALIB3D) || defined(DLSD_HAVE_CCALIB)
+template <class M>
+void agreesWithOpenCv(
+    const std::function<std::vector<cv::Point2d>(const M&, const std::vector<cv::Point3d>&)>&
+        projectPoints,
+    double max_angle) {
+  Worst worst("difference to OpenCV, in units of 1e-9 px");
+  holds([&] {
+    const Camera camera = *genCamera<M>(Range::kRealistic);
+    std::vector<cv::Point3d> points;
+    std::vector<Vector2d> ours;
+    for (const Vector3d& ray : many(genRayFor(camera))) {
+      if (!(fieldAngle(ray) < max_angle)) continue;
+      const auto pixel = camera.project(ray);
+      if (!pixel || pixel->cwiseAbs().maxCoeff() > 1e5) continue;
+      const double depth = 0.5 + static_cast<double>(points.size());
+      points.emplace_back(depth * ray.x(), depth * ray.y(), depth * ray.z());
+      ours.push_back(*pixel);
+    }
+    if (points.empty()) return;
+    const auto theirs = projectPoints(modelOf<M>(camera), points);
+    RC_ASSERT(theirs.size() == ours.size());
+    for (size_t i = 0; i < ours.size(); ++i) {
+      const double error = std::hypot(theirs[i].x - ours[i].x(), theirs[i].y - ours[i].y());
+      worst.see(error / 1e-9);
+      if (!(error <= 1e-9)) RC_FAIL(describe(camera, Vector2d(ours[i])));
+    }
+  });
+  EXPECT_GT(worst.count(), 2000);
+}
+
+template <class M>
+cv::Matx33d cameraMatrix(const M& m) {
+  return {m.fx, 0, m.cx, 0, m.fy, m.cy, 0, 0, 1};
+}
+#endif
+
+TEST(OpenCv, ProjectPointsIsOurPinhole) {
+#ifdef DLSD_HAVE_CALIB3D
+  agreesWithOpenCv<Pinhole>(
+      [](const Pinhole& m, const std::vector<cv::Point3d>& points) {
+        std::vector<cv::Point2d> pixels;
+        cv::projectPoints(points, cv::Vec3d(), cv::Vec3d(), cameraMatrix(m), cv::noArray(), pixels);
+        return pixels;
+      },
+      M_PI / 2);
+#else
+  GTEST_SKIP() << "built without OpenCV's calib3d";
+#endif
+}
+
+TEST(OpenCv, FisheyeIsOurKannalaBrandtBelow90Degrees) {
+#ifdef DLSD_HAVE_CALIB3D
+  // OpenCV divides by z first, and so loses digits towards 90 degrees and is wrong beyond.
+  agreesWithOpenCv<KannalaBrandt>(
+      [](const KannalaBrandt& m, const std::vector<cv::Point3d>& points) {
+        std::vector<cv::Point2d> pixels;
+        cv::fisheye::projectPoints(
+            points, pixels, cv::Affine3d(), cameraMatrix(m), cv::Vec4d(m.k1, m.k2, m.k3, m.k4));
+        return pixels;
+      },
+      89.9 * M_PI / 180);
+#else
+  GTEST_SKIP() << "built without OpenCV's calib3d";
+#endif
+}
+
+TEST(OpenCv, OmnidirIsOurUnifiedOmni) {
+#ifdef DLSD_HAVE_CCALIB
+  agreesWithOpenCv<UnifiedOmni>(
+      [](const UnifiedOmni& m, const std::vector<cv::Point3d>& points) {
+        std::vector<cv::Point2d> pixels;
+        cv::omnidir::projectPoints(
+            points, pixels, cv::Vec3d(), cv::Vec3d(), cameraMatrix(m), m.xi, cv::Vec4d());
+        return pixels;
+      },
+      M_PI);
+#else
+  GTEST_SKIP() << "built without OpenCV's ccalib";
+#endif
+}
+
+}  // namespace
+}  // namespace dlsd

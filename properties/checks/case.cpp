@@ -1,0 +1,112 @@
+#include "properties/checks/case.h"
+
+#include <fmt/format.h>
+
+#include <stdexcept>
+#include <utility>
+
+#include "cameras/calibration/files.h"
+#include "synth/dataset/json_fields.h"
+
+namespace dlsd {
+namespace {
+
+using nlohmann::ordered_json;
+
+/// The parameter table of a model by its name; empty if there is no such model.
+std::span<const ParamSpec> paramSpecsOf(std::string_view model_name) {
+  std::span<const ParamSpec> specs;
+  const auto find = [&]<size_t... I>(std::index_sequence<I...>) {
+    ((std::variant_alternative_t<I, CameraModelVariant>::kName == model_name
+          ? void(specs = std::variant_alternative_t<I, CameraModelVariant>::kParams)
+          : void()),
+     ...);
+  };
+  find(std::make_index_sequence<std::variant_size_v<CameraModelVariant>>());
+  return specs;
+}
+
+ordered_json cameraToJson(const Camera& camera) {
+  ordered_json params;
+  const std::vector<double> values = camera.params();
+  for (size_t i = 0; i < values.size(); ++i) {
+    params[std::string(camera.paramSpecs()[i].name)] = values[i];
+  }
+  return {{"model", camera.modelName()},
+          {"params", params},
+          {"width", camera.width()},
+          {"height", camera.height()},
+          {"max_field_angle", camera.maxFieldAngleLimit()}};
+}
+
+Camera cameraFromJson(const JsonField& json) {
+  const std::string model = json["model"].text();
+  std::vector<double> values;
+  for (const ParamSpec& spec : paramSpecsOf(model)) {
+    values.push_back(json["params"][std::string(spec.name).c_str()].number());
+  }
+  try {
+    return makeCamera(model,
+                      values,
+                      json["width"].integer(1, 65535),
+                      json["height"].integer(1, 65535),
+                      json["max_field_angle"].number());
+  } catch (const std::invalid_argument& error) {
+    json.fail(error.what());
+  }
+}
+
+SensorOptions sensorFromJson(const JsonField& json) {
+  SensorOptions sensor;
+  sensor.psf_sigma_px = json["psf_sigma_px"].number();
+  sensor.exposure = json["exposure"].number();
+  sensor.read_noise_levels = json["read_noise_levels"].number();
+  const std::string encoding = json["encoding"].text();
+  if (encoding == "linear") {
+    sensor.encoding = Encoding::kLinear;
+  } else if (encoding == "srgb") {
+    sensor.encoding = Encoding::kSrgb;
+  } else if (encoding == "gamma") {
+    sensor.encoding = Encoding::kGamma;
+    sensor.gamma = json["gamma"].number();
+  } else {
+    json["encoding"].fail("is none of linear, srgb, gamma");
+  }
+  return sensor;
+}
+
+}  // namespace
+
+ordered_json toJson(const FrameCase& frame_case) {
+  return {{"format", "dlsd-case/1"},
+          {"property", frame_case.property},
+          {"camera", cameraToJson(frame_case.camera)},
+          {"scene", frame_case.scene},
+          {"seed", frame_case.seed},
+          {"index", frame_case.index},
+          {"sensor", toJson(frame_case.sensor)},
+          {"detector", frame_case.detector}};
+}
+
+FrameCase frameCaseFromJson(const nlohmann::json& json, const std::string& source) {
+  const JsonField root(json, source);
+  if (root["format"].text() != "dlsd-case/1") root["format"].fail("is not dlsd-case/1");
+  return {root["property"].text(),
+          cameraFromJson(root["camera"]),
+          root["scene"].text(),
+          root["seed"].counter(),
+          root["index"].counter(),
+          sensorFromJson(root["sensor"]),
+          root["detector"].text()};
+}
+
+Frame renderCase(const FrameCase& frame_case) {
+  GenerateOptions options;
+  options.cameras = {{"camera", frame_case.camera}};
+  options.scene = frame_case.scene;
+  options.seed = frame_case.seed;
+  options.sensor = frame_case.sensor;
+  return renderFrame(options, frame_case.index);
+}
+
+}  // namespace dlsd

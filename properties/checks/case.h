@@ -1,0 +1,33 @@
+#pragma once
+// One case of a property over generated frames: everything that is needed to make it again.
+// No RapidCheck here, so that `dlsd replay` and the suites use the very same code.
+
+#include <cstdint>
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "cameras/camera.h"
+#include "synth/generate.h"
+
+namespace dlsd {
+
+/// What a property is checked on: a frame, made again bit for bit from these values, and the options
+/// of the detector by name.
+struct FrameCase {
+  std::string property;             ///< Which predicate judges it, e.g. "recovery".
+  Camera camera;
+  std::string scene = "room";       ///< Preset.
+  uint64_t seed = 0, index = 0;
+  SensorOptions sensor;
+  std::string detector = "dlsd";     ///< One of builtinDetectors().
+};
+
+[[nodiscard]] nlohmann::ordered_json toJson(const FrameCase& frame_case);
+
+/// Throws InputError with source, key and value for anything missing, unknown or out of range.
+[[nodiscard]] FrameCase frameCaseFromJson(const nlohmann::json& json, const std::string& source);
+
+/// The frame that the case describes.
+[[nodiscard]] Frame renderCase(const FrameCase& frame_case);
+
+}  // namespace dlsd
