@@ -241,7 +241,8 @@ void Detector::Impl::collectSeeds() {
         CrestOffset offset{0, 0};
         if (options.edges.subpixel) offset = crestOffset(field, p.x, p.y);
         points.emplace_back(p.x + offset.dx, p.y + offset.dy);
-        chain_rays.add(rays.at(points.back().x(), points.back().y()).ray, rays.pxPerRad(p.x, p.y));
+        const RaySample sample = rays.at(points.back().x(), points.back().y());
+        chain_rays.add(sample.ray, sample.pxPerRad());
       }
     }
     const StopWatch watch(&times.planes);
@@ -255,6 +256,8 @@ void Detector::Impl::collectSeeds() {
         magnitude += field.magnitude[field.at(chains.pixels[i].x, chains.pixels[i].y)];
       }
       seed.trace.normal = piece.normal;
+      seed.trace.moments = chain_rays.moments.interval(piece.begin, piece.end);
+      seed.trace.points = piece.end - piece.begin;
       seed.trace.rms_px = piece.rms_px;
       seed.trace.gradient = magnitude / (piece.end - piece.begin);
       seed.trace.start_px = points[static_cast<size_t>((piece.begin + piece.end) / 2)];

@@ -86,7 +86,7 @@ bool LineTracer::refit() {
   const auto fit = fitPlane(moments_);
   if (!fit) return false;
   normal_ = fit->normal.dot(normal_) < 0 ? Eigen::Vector3d(-fit->normal) : fit->normal;
-  edges_at_fit_ = edges_;
+  points_at_fit_ = points_;
   return true;
 }
 
@@ -108,7 +108,7 @@ void LineTracer::extend(const GradientField& field,
     const int x = static_cast<int>(std::floor(next.x() + 0.5));
     const int y = static_cast<int>(std::floor(next.y() + 0.5));
     if (!rays_.isUsable(x, y)) {
-      front->ended = true;
+      front->ended = front->at_border = true;
       break;
     }
     const RaySample sample = rays_.at(next.x(), next.y());
@@ -121,7 +121,7 @@ void LineTracer::extend(const GradientField& field,
     next -= curve.offset_px * curve.normal;
     Step step{};
     if (!evaluate(field, min_magnitude, bound_px, next, curve, &step)) {
-      front->ended = true;
+      front->ended = front->at_border = true;
       break;
     }
     last_ray = sample.ray;
@@ -131,8 +131,8 @@ void LineTracer::extend(const GradientField& field,
     if (step.is_edge) {
       misses = 0;
       moments_.add(step.ray, step.px_per_rad * step.px_per_rad);
-      ++edges_;
-      if (edges_ >= edges_at_fit_ + std::max(8, edges_at_fit_ / 4)) {
+      ++points_;
+      if (points_ >= points_at_fit_ + std::max(8, points_at_fit_ / 4)) {
         if (!refit()) front->ended = true;
       }
     } else {
@@ -166,15 +166,29 @@ void LineTracer::cutTail(std::vector<Step>* steps) {
   }
 }
 
+LineTracer::End LineTracer::endOf(const Step& last, int direction, bool at_border) const {
+  End end{last.crest_px, last.ray};
+  if (!at_border) return end;
+  Eigen::Vector2d position = last.curve_px;
+  for (int i = 0; i < options_.max_gap_px; ++i) {
+    const CurveOffset here = curveOffset(rays_.at(position.x(), position.y()), normal_);
+    position += direction * Eigen::Vector2d(-here.normal.y(), here.normal.x()) -
+                here.offset_px * here.normal;
+    if (!(here.rad_per_px > 0) || !rays_.covers(position.x(), position.y())) break;
+    end = {position, rays_.at(position.x(), position.y()).ray};
+  }
+  return end;
+}
+
 std::optional<TracedLine> LineTracer::trace(const GradientField& field,
                                             const EdgeThresholds& thresholds,
                                             double noise,
                                             const TraceSeed& seed) {
   forward_.clear();
   backward_.clear();
-  moments_ = {};
+  moments_ = seed.moments;
   normal_ = seed.normal;
-  edges_ = edges_at_fit_ = 0;
+  points_ = points_at_fit_ = seed.points;
   angle_rad_ = 0;
 
   // The vertex of a parabola through a crest of height P scatters by about 2 noise / P px.
@@ -200,8 +214,12 @@ std::optional<TracedLine> LineTracer::trace(const GradientField& field,
     extend(field, thresholds.chain, bound_px, -1, &backward_, &back);
     if (!refit()) return std::nullopt;
   }
+  const size_t forward_size = forward_.size(), backward_size = backward_.size();
   cutTail(&forward_);
   cutTail(&backward_);
+  // A cut by more than a flaw means that the edge had ended before the border.
+  front.at_border = front.at_border && forward_.size() + kGapPx > forward_size;
+  back.at_border = back.at_border && backward_.size() + kGapPx > backward_size;
 
   // One sequence from the backward end to the forward end.
   std::reverse(backward_.begin(), backward_.end());
@@ -261,10 +279,15 @@ std::optional<TracedLine> LineTracer::trace(const GradientField& field,
   line.bend_sigma_px =
       2 * line.rms_px * std::sqrt(AlignmentCounter::kCorrelatedPx / line.edge_points);
   line.polarity = polarity < 0 ? -1 : 1;
-  line.from_ray = steps.front().ray;
-  line.to_ray = steps.back().ray;
-  line.from_px = steps.front().crest_px;
-  line.to_px = steps.back().crest_px;
+  normal_ = normal_.dot(fit->normal) < 0 ? Eigen::Vector3d(-fit->normal) : fit->normal;
+  const End from = endOf(steps.front(), -1, back.at_border);
+  const End to = endOf(steps.back(), +1, front.at_border);
+  line.from_ray = from.ray;
+  line.to_ray = to.ray;
+  line.from_px = from.px;
+  line.to_px = to.px;
+  line.length_px +=
+      (from.px - steps.front().crest_px).norm() + (to.px - steps.back().crest_px).norm();
   return line;
 }
 

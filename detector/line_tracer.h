@@ -17,6 +17,8 @@ namespace dlsd {
 /// What a trace needs to know of the line it starts from.
 struct TraceSeed {
   Eigen::Vector3d normal;
+  RayMoments moments;        ///< That gave the normal, weights in px^2 per rad^2.
+  int points;                ///< Number of rays in them.
   Eigen::Vector2d start_px;  ///< Near the curve, within 1 px of a usable pixel.
   double rms_px;             ///< Residuals of the seed's edge pixels.
   double gradient;           ///< Typical magnitude on it, in units of GradientField.
@@ -24,8 +26,8 @@ struct TraceSeed {
 
 struct TracedLine {
   PlaneFit fit;                      ///< Weights in px^-2: squared_residuals is in px^2.
-  Eigen::Vector3d from_ray, to_ray;  ///< Rays of the first and last edge point (not on the plane).
-  Eigen::Vector2d from_px, to_px;    ///< Those points.
+  Eigen::Vector3d from_ray, to_ray;  ///< Rays of the ends (near the plane, not on it).
+  Eigen::Vector2d from_px, to_px;    ///< Those ends.
   double length_px;                  ///< Along the curve.
   int edge_points;
   double rms_px, max_px;  ///< Reprojection errors of the edge points.
@@ -43,8 +45,9 @@ class LineTracer {
   /// if a crest of the gradient along the curve's normal lies within the bound of the residuals of
   /// the curve and its gradient is within pi / 8 of the normal, of either sign. The plane is
   /// refitted to the crests as the line grows. The line ends before max_gap_px + 1 steps without an
-  /// edge; a gap is only crossed to reach at least kMinRunPx more. No value if fewer than
-  /// min_length_px remain.
+  /// edge; a gap is only crossed to reach at least kMinRunPx more.
+  /// A line that still shows an edge where the usable part of the image ends is taken to go on to
+  /// the border or rim itself, but at most max_gap_px. No value if fewer than min_length_px remain.
   [[nodiscard]] std::optional<TracedLine> trace(const GradientField& field,
                                                 const EdgeThresholds& thresholds,
                                                 double noise,
@@ -70,6 +73,11 @@ class LineTracer {
   struct Front {
     Eigen::Vector2d position, normal;  // on the curve; normal of the curve there
     bool ended = false;
+    bool at_border = false;  // of the usable part of the image
+  };
+  struct End {
+    Eigen::Vector2d px;
+    Eigen::Vector3d ray;
   };
 
   bool evaluate(const GradientField& field,
@@ -85,14 +93,16 @@ class LineTracer {
               std::vector<Step>* steps,
               Front* front);
   bool refit();
+  [[nodiscard]] End endOf(const Step& last, int direction, bool at_border) const;
   static void cutTail(std::vector<Step>* steps);
 
   const RayTable& rays_;
   ValidationOptions options_;
   std::vector<Step> forward_, backward_;
+  // The seed's points count until the end, so that the first few crests do not turn the plane.
   RayMoments moments_;
   Eigen::Vector3d normal_;
-  int edges_ = 0, edges_at_fit_ = 0;
+  int points_ = 0, points_at_fit_ = 0;
   double angle_rad_ = 0;
   std::vector<uint32_t> crest_pixels_;
   std::vector<uint8_t> crest_along_x_;

@@ -1,6 +1,5 @@
 #include "detector/ray_table.h"
 
-#include <Eigen/Geometry>
 #include <algorithm>
 
 #include "cameras/batch.h"
@@ -44,6 +43,7 @@ RayTable::RayTable(const Camera& camera)
       e.ray[0] = static_cast<float>(x[i]);
       e.ray[1] = static_cast<float>(y[i]);
       e.ray[2] = static_cast<float>(z[i]);
+      e.has_ray = 1;
     }
   }
   for (int row = 0; row < height_; ++row) {
@@ -56,12 +56,7 @@ RayTable::RayTable(const Camera& camera)
   for (int row = kBorderPx; row < height_ - kBorderPx; ++row) {
     for (int column = kBorderPx; column < width_ - kBorderPx; ++column) {
       const size_t i = index(column, row);
-      if (near[i] != 0) continue;
-      usable_[i] = 0xffff;
-      const Eigen::Vector3d du = at(column + 1, row) - at(column - 1, row);
-      const Eigen::Vector3d dv = at(column, row + 1) - at(column, row - 1);
-      const double area = du.cross(dv).norm() / 4;
-      entries_[i].px_per_rad = static_cast<float>(1 / std::sqrt(std::max(area, 1e-18)));
+      if (near[i] == 0) usable_[i] = 0xffff;
     }
   }
 }

@@ -14,6 +14,13 @@ namespace dlsd {
 struct RaySample {
   Eigen::Vector3d ray;     ///< Unit, camera frame.
   Eigen::Vector3d du, dv;  ///< d(ray) / d(pixel), rad per px, to first order in the cell.
+
+  /// Mean over directions: 1 / sqrt(|du x dv|); 0 where the camera does not resolve directions.
+  [[nodiscard]] double pxPerRad() const {
+    const double uv = du.dot(dv);
+    const double area2 = du.squaredNorm() * dv.squaredNorm() - uv * uv;
+    return area2 > 1e-36 ? 1 / std::sqrt(std::sqrt(area2)) : 0;
+  }
 };
 
 /// Where a pixel lies relative to the image of a plane.
@@ -39,7 +46,7 @@ class RayTable {
     return x >= 0 && y >= 0 && x < width_ && y < height_ && usable_[index(x, y)] != 0;
   }
 
-  /// Position within 1 px of a usable pixel.
+  /// The position must be covered; all within 1 px of a usable pixel are.
   [[nodiscard]] RaySample at(double u, double v) const {
     const int x = static_cast<int>(u), y = static_cast<int>(v);
     const auto a = static_cast<float>(u - x), b = static_cast<float>(v - y);
@@ -60,16 +67,19 @@ class RayTable {
     return s;
   }
 
+  /// Whether at(u, v) may be asked: the four pixels around are in the image and have rays.
+  [[nodiscard]] bool covers(double u, double v) const {
+    if (!(u >= 0 && v >= 0 && u < width_ - 1 && v < height_ - 1)) return false;
+    const int x = static_cast<int>(u), y = static_cast<int>(v);
+    return hasRay(x, y) && hasRay(x + 1, y) && hasRay(x, y + 1) && hasRay(x + 1, y + 1);
+  }
+
   /// Ray of a usable pixel's centre.
   [[nodiscard]] Eigen::Vector3d at(int x, int y) const {
     const Entry& e = entries_[index(x, y)];
     return {static_cast<double>(e.ray[0]),
             static_cast<double>(e.ray[1]),
             static_cast<double>(e.ray[2])};
-  }
-  /// Pixels per rad at a usable pixel, mean over directions: 1 / sqrt(|du x dv|).
-  [[nodiscard]] double pxPerRad(int x, int y) const {
-    return static_cast<double>(entries_[index(x, y)].px_per_rad);
   }
 
   static constexpr int kBorderPx = 2;
@@ -78,8 +88,9 @@ class RayTable {
  private:
   struct Entry {
     float ray[3];
-    float px_per_rad;
+    float has_ray;
   };
+  [[nodiscard]] bool hasRay(int x, int y) const { return entries_[index(x, y)].has_ray != 0; }
   [[nodiscard]] size_t index(int x, int y) const {
     return static_cast<size_t>(y) * static_cast<size_t>(width_) + static_cast<size_t>(x);
   }

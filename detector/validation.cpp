@@ -41,8 +41,7 @@ void AlignmentCounter::add(double gx,
 }
 
 double AlignmentCounter::score(int width, int height) const {
-  const double log_tests =
-      2 * std::log10(static_cast<double>(width) * height) + std::log10(double{kLevels});
+  const double log_tests = std::log10(static_cast<double>(width) * height * kLevels);
   double best = 0;
   double p = 0.25;
   for (int level = 0; level < kLevels; ++level, p /= 2) {
