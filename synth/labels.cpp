@@ -281,29 +281,46 @@ double curveLength(const std::vector<Eigen::Vector2d>& points) {
   return length;
 }
 
+/// Width in px of a rod at an angle of its centre line's arc; 0 outside the domain.
+double rodWidthPx(const Scene& scene,
+                  const Camera& camera,
+                  const Edge& centre_line,
+                  const EdgeArc& arc,
+                  const Segment& segment,
+                  double phi) {
+  const Eigen::Vector3d d = segment.to - segment.from;
+  const auto J = camera.jacobian(segment.from + fractionAt(arc, segment, phi) * d);
+  if (!J) return 0;
+  const double radius = scene.rods[static_cast<size_t>(centre_line.rod)].radius;
+  const Eigen::Vector2d along = (*J * d).normalized();
+  const Eigen::Vector2d across = *J * (2 * radius * arc.normal);
+  return std::abs(along.x() * across.y() - along.y() * across.x());
+}
+
+/// What a Gaussian blur and the mean over a pixel (as a Gaussian of the same variance, 1/12 px^2)
+/// leave of the contrast in the middle of a stripe.
+double shareLeftByBlur(double width_px, double psf_sigma_px) {
+  const double sigma = std::sqrt(psf_sigma_px * psf_sigma_px + 1.0 / 12);
+  return std::erf(width_px / (2 * std::sqrt(2.0) * sigma));
+}
+
 /// Per rod: labelled by its centre line in this view?
 std::vector<char> findWires(const Scene& scene, const Camera& camera, const Pose& pose) {
   std::vector<char> wires(scene.rods.size(), 0);
   for (size_t i = 0; i < scene.edges.size(); ++i) {
-    if (scene.edges[i].source != EdgeSource::kRodCentre) continue;
-    const auto e = edgeArc(scene, pose, static_cast<int>(i));
-    if (!e) continue;
-    const Segment segment = segmentOf(scene.edges[i], pose);
-    const auto rod = static_cast<size_t>(scene.edges[i].rod);
+    const Edge& edge = scene.edges[i];
+    if (edge.source != EdgeSource::kRodCentre) continue;
+    const auto arc = edgeArc(scene, pose, static_cast<int>(i));
+    if (!arc) continue;
+    const Segment segment = segmentOf(edge, pose);
     double widest = -1;
-    for (const ImageSpan& span : imageSpans(camera, e->arc)) {
+    for (const ImageSpan& span : imageSpans(camera, arc->arc)) {
       for (int k = 0; k < kWidthPoints; ++k) {
         const double t = span.t0 + (span.t1 - span.t0) * k / (kWidthPoints - 1);
-        const double s = fractionAt(*e, segment, t * e->angle);
-        const Eigen::Vector3d point = segment.from + s * (segment.to - segment.from);
-        const auto J = camera.jacobian(point);
-        if (!J) continue;
-        const Eigen::Vector2d along = (*J * (segment.to - segment.from)).normalized();
-        const Eigen::Vector2d across = *J * (2 * scene.rods[rod].radius * e->normal);
-        widest = std::max(widest, std::abs(along.x() * across.y() - along.y() * across.x()));
+        widest = std::max(widest, rodWidthPx(scene, camera, edge, *arc, segment, t * arc->angle));
       }
     }
-    wires[rod] = widest >= 0 && widest < kThickRodPx ? 1 : 0;
+    wires[static_cast<size_t>(edge.rod)] = widest >= 0 && widest < kThickRodPx ? 1 : 0;
   }
   return wires;
 }
@@ -452,8 +469,12 @@ Labels makeLabels(const Scene& scene,
       }
       const Look left = look(ray + std::tan(offset) * arc->normal);
       const Look right = look(ray - std::tan(offset) * arc->normal);
-      const double contrast = is_wire ? std::abs(look(ray).grey - (left.grey + right.grey) / 2)
-                                      : std::abs(left.grey - right.grey);
+      double contrast = std::abs(left.grey - right.grey);
+      if (is_wire) {
+        const double width_px = rodWidthPx(scene, camera, edge, *arc, segment, phi);
+        contrast = std::abs(look(ray).grey - (left.grey + right.grey) / 2) *
+                   shareLeftByBlur(width_px, sensor.psf_sigma_px);
+      }
       line.contrast += contrast / kContrastPoints;
       line.contrast_min = std::min(line.contrast_min, contrast);
       const auto containsEdge = [&](const Hit& hit) {

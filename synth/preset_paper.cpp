@@ -26,11 +26,11 @@ struct Table {
 
 Table addScene(uint64_t seed, SceneBuilder* builder) {
   Random random(seed, kSceneStream);
-  const auto dark = [&] { return Surface{random.next(0.035, 0.09), 0}; };
+  const auto dark = [&] { return Surface{random.next(0.05, 0.12), 0}; };
   const Vector3d room(6, 5, 2.8);
   std::array<Panel, 4> walls;
-  for (Panel& wall : walls) wall.surface = {random.next(0.07, 0.13), 0};
-  builder->addRoom(room, walls, {0.06, 0}, {0.12, 0});
+  for (Panel& wall : walls) wall.surface = {random.next(0.14, 0.28), 0};
+  builder->addRoom(room, walls, {random.next(0.08, 0.16), 0}, {0.3, 0});
 
   Table table;
   const double width = random.next(1.6, 2.2), depth = random.next(0.9, 1.2), height = 0.74;
@@ -80,16 +80,16 @@ Table addScene(uint64_t seed, SceneBuilder* builder) {
     const double w = random.next(0.5, 1.2), h = random.next(0.5, 1.9);
     const double x = k % 2 == 0 ? 0.1 : room.x() - w - 0.1;
     const double y = k / 2 == 0 ? 0.1 : room.y() - 0.5;
-    builder->addBox(world, {x, y, 0}, {x + w, y + 0.4, h}, {random.next(0.05, 0.14), 0});
+    builder->addBox(world, {x, y, 0}, {x + w, y + 0.4, h}, {random.next(0.08, 0.25), 0});
   }
 
   Scene& scene = builder->scene;
-  scene.ambient_up = random.next(0.45, 0.55);
+  scene.ambient_up = random.next(0.5, 0.6);
   scene.ambient_down = 0.3;
   Light lamp;
   lamp.kind = Light::Kind::kPoint;
   lamp.place = {room.x() / 2 + random.next(-1, 1), room.y() / 2 + random.next(-1, 1), 2.6};
-  lamp.strength = random.next(0.4, 0.5);
+  lamp.strength = random.next(0.45, 0.55);
   lamp.half_distance = 4;
   scene.lights.push_back(lamp);
   return table;
@@ -124,7 +124,7 @@ SceneView makePaper(uint64_t seed, uint64_t index) {
   // Around the sheets, nearer and further, from straight above to a flat view.
   const double around = 1.1 * M_PI * waves.at(t, 31);
   const double tilt = 0.5 + 0.45 * waves.at(t, 17);
-  const double distance = 0.5 + 0.25 * waves.at(t, 23);
+  const double distance = 0.34 + 0.14 * waves.at(t, 23);
   const Vector3d aim = middle + Vector3d{0.14 * waves.at(t, 13), 0.1 * waves.at(t, 11), 0.0};
   const double roll = 0.5 * waves.at(t, 19);
   const Vector3d offset(

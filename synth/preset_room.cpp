@@ -118,57 +118,95 @@ class RoomMaker {
     for (const Pane& w : windows) {
       const Pocket& pocket = walls[static_cast<size_t>(w.wall)].pockets[w.pocket];
       const PanelFaces& frame = faces[static_cast<size_t>(w.wall)].pockets[w.pocket];
+      if (frame.pockets.empty()) addFlatPanes(frame.front, pocket);
       for (size_t p = 0; p < frame.pockets.size(); ++p) {
-        addOutside(frame.pockets[p].front, pocket.bottom.pockets[p]);
+        const Pocket& pane = pocket.bottom.pockets[p];
+        addOutside(frame.pockets[p].front, {0, 0}, {pane.x1 - pane.x0, pane.y1 - pane.y0});
       }
       const Frame3 f = SceneBuilder::wallFrame(size_, w.wall);
       // Nothing tall in front of a window.
       taken_.push_back(boxIn(f, {pocket.x0, pocket.y0, 0}, {pocket.x1, pocket.y1, 0.45}));
-      if (random_.nextBool(0.3)) addBlind(f, pocket);
-      if (random_.nextBool(0.7)) addRadiator(f, pocket);
+      if (random_.nextBool(0.12)) addBlind(f, pocket);
+      if (random_.nextBool(0.4)) addRadiator(f, pocket);
     }
     addDoor(door_wall);
-    addSkirting(door_wall);
+    if (random_.nextBool(0.5)) addSkirting(door_wall);
     addFloorPattern();
   }
 
-  /// A niche with a frame and mullions; the panes glow.
+  struct PaneGrid {
+    int columns, rows;
+    double bar, w, h;
+    Surface glass;
+    [[nodiscard]] Vector2d corner(int i, int j) const {
+      return {bar + i * (w + bar), bar + j * (h + bar)};
+    }
+  };
+
+  PaneGrid paneGrid(double width, double height) {
+    PaneGrid grid{};
+    grid.columns = std::max(1, static_cast<int>(width / random_.next(0.5, 1.2)));
+    grid.rows = random_.nextInt(1, 2);
+    grid.bar = random_.next(0.05, 0.1);
+    grid.w = (width - grid.bar * (grid.columns + 1)) / grid.columns;
+    grid.h = (height - grid.bar * (grid.rows + 1)) / grid.rows;
+    grid.glass = {0.1, random_.next(0.35, 0.75)};
+    return grid;
+  }
+
+  /// A niche with a frame; the panes glow. In some windows they lie behind mullions, in others
+  /// flush.
   Pocket windowPocket(double lo, double hi, const Surface& wall) {
     const double width = std::min(hi - lo, random_.next(0.9, 2.2));
     const double x0 = lo + (hi - lo - width) * random_.next(0, 1);
-    const double y0 = random_.next(0.8, 1.0),
-                 y1 = std::min(size_.z() - 0.2, y0 + random_.next(1.0, 1.5));
+    const double y0 = random_.next(0.8, 1.0);
+    const double y1 = std::min(size_.z() - 0.2, y0 + random_.next(1.0, 1.5));
     Pocket niche{x0, x0 + width, y0, y1, random_.next(0.1, 0.25), near(wall, 0.1), {}};
     niche.bottom.surface = paint(0.55, 0.85);
-    const int columns = std::max(1, static_cast<int>(width / random_.next(0.35, 0.8)));
-    const int rows = random_.nextInt(1, 3);
-    const double bar = random_.next(0.035, 0.07), depth = random_.next(0.02, 0.05);
-    const double w = (width - bar * (columns + 1)) / columns;
-    const double h = (y1 - y0 - bar * (rows + 1)) / rows;
-    const double glow = random_.next(0.35, 0.75);
-    for (int j = 0; j < rows; ++j) {
-      for (int i = 0; i < columns; ++i) {
-        const double px = x0 + bar + i * (w + bar), py = y0 + bar + j * (h + bar);
-        niche.bottom.pockets.push_back(
-            {px, px + w, py, py + h, depth, near(niche.bottom.surface, 0.1), plain({0.1, glow})});
+    if (random_.nextBool(0.6)) return niche;
+    const PaneGrid grid = paneGrid(width, y1 - y0);
+    const double depth = random_.next(0.015, 0.04);
+    for (int j = 0; j < grid.rows; ++j) {
+      for (int i = 0; i < grid.columns; ++i) {
+        const Vector2d at = Vector2d(x0, y0) + grid.corner(i, j);
+        niche.bottom.pockets.push_back({at.x(),
+                                        at.x() + grid.w,
+                                        at.y(),
+                                        at.y() + grid.h,
+                                        depth,
+                                        near(niche.bottom.surface, 0.1),
+                                        plain(grid.glass)});
       }
     }
     return niche;
   }
 
-  /// A hint of houses behind a pane.
-  void addOutside(int face, const Pocket& pane) {
-    const double w = pane.x1 - pane.x0, h = pane.y1 - pane.y0;
+  void addFlatPanes(int face, const Pocket& niche) {
+    const PaneGrid grid = paneGrid(niche.x1 - niche.x0, niche.y1 - niche.y0);
+    const Vector2d half(grid.w / 2, grid.h / 2);
+    for (int j = 0; j < grid.rows; ++j) {
+      for (int i = 0; i < grid.columns; ++i) {
+        const Vector2d at = grid.corner(i, j);
+        builder_.addDecal(face, {DecalShape::kRectangle, at + half, half, 0, grid.glass});
+        addOutside(face, at, at + 2 * half);
+      }
+    }
+  }
+
+  /// A hint of houses behind the pane [lo, hi] of a face.
+  void addOutside(int face, const Vector2d& lo, const Vector2d& hi) {
+    const double w = hi.x() - lo.x(), h = hi.y() - lo.y();
     if (!random_.nextBool(0.5) || w < 0.25 || h < 0.3) return;
-    const double hw = w * random_.next(0.15, 0.4), hh = h * random_.next(0.15, 0.42);
-    const Vector2d centre{random_.next(hw + 0.01, w - hw - 0.01), hh + 0.01};
+    const Vector2d half{w * random_.next(0.15, 0.4), h * random_.next(0.15, 0.42)};
+    const Vector2d centre =
+        lo + Vector2d(random_.next(half.x() + 0.01, w - half.x() - 0.01), half.y() + 0.01);
     const double glow = random_.next(0.1, 0.3);
-    builder_.addDecal(face, {DecalShape::kRectangle, centre, {hw, hh}, 0, {0.1, glow}});
-    if (hw < 0.08) return;
+    builder_.addDecal(face, {DecalShape::kRectangle, centre, half, 0, {0.1, glow}});
+    if (half.x() < 0.08) return;
     builder_.addDecal(face,
                       {DecalShape::kRectangle,
-                       centre + Vector2d(0, hh * 0.2),
-                       {hw * 0.35, hh * 0.3},
+                       centre + Vector2d(0, half.y() * 0.2),
+                       {half.x() * 0.35, half.y() * 0.3},
                        0,
                        {0.1, glow + 0.15}});
   }
@@ -197,7 +235,7 @@ class RoomMaker {
     const Box3 box = boxIn(wall, {x0, y0, 0}, {x0 + width, y0 + height, kWallGap + depth});
     if (!isFree(box)) return;
     Panel front = plain(paint(0.6, 0.85));
-    const int ribs = std::max(2, static_cast<int>(width / 0.09));
+    const int ribs = std::max(2, static_cast<int>(width / 0.16));
     for (int i = 0; i < ribs; ++i) {
       const double rib = width / ribs;
       front.pockets.push_back({rib * i + 0.025,
@@ -227,7 +265,7 @@ class RoomMaker {
                 proud * 0.6,
                 near(front.surface, 0.1),
                 plain(anyPaint())};
-    const int rows = random_.nextInt(1, 4), columns = random_.nextInt(1, 2);
+    const int rows = random_.nextInt(1, 3), columns = random_.nextInt(1, 2);
     const double leaf_w = leaf.x1 - leaf.x0, leaf_h = leaf.y1 - leaf.y0, rail = 0.11;
     const double w = (leaf_w - rail * (columns + 1)) / columns;
     const double h = (leaf_h - rail * (rows + 1)) / rows;
@@ -278,32 +316,33 @@ class RoomMaker {
     }
   }
 
-  /// Planks or tiles, as prints with joints between.
+  /// Stripes, a chequered floor or tiles with joints, as prints.
   void addFloorPattern() {
-    const int kind = random_.nextInt(0, 2);
-    if (kind == 0) return;
+    const double kind = random_.next(0, 1);
+    if (kind < 0.45) return;
     plain_floor_ = false;
-    const bool planks = kind == 1;
-    const double w = planks ? random_.next(0.6, 1.4) : random_.next(0.3, 0.6);
-    const double h = planks ? random_.next(0.12, 0.22) : w;
-    const double joint = planks ? 0.006 : random_.next(0.006, 0.015);
-    const double margin = 0.05;
-    const double spread = planks ? 0.25 : 0.08;
-    const Surface tile = near(floor_paint_, 0.5);
-    for (int j = 0; margin + (j + 1) * h < size_.y() - margin; ++j) {
-      const double y = margin + j * h;
-      const double start = planks ? -w * random_.next(0, 1) : 0;
-      for (int i = 0;; ++i) {
-        const double x0 = std::max(margin, margin + start + i * w);
-        const double x1 = std::min(size_.x() - margin, margin + start + (i + 1) * w);
-        if (x0 > size_.x() - margin - 0.1) break;
-        if (x1 - x0 < 0.1) continue;
-        builder_.addDecal(floor_,
-                          {DecalShape::kRectangle,
-                           {(x0 + x1) / 2, y + h / 2},
-                           {(x1 - x0 - joint) / 2, (h - joint) / 2},
-                           0,
-                           near(tile, spread)});
+    constexpr double kMarginToWall = 0.05;
+    const Vector2d area(size_.x() - 2 * kMarginToWall, size_.y() - 2 * kMarginToWall);
+    const bool tiles = kind > 0.9, stripes = kind < 0.68;
+    const double wanted = random_.next(0.4, 0.85);
+    const double joint = tiles ? random_.next(0.008, 0.02) : 0;
+    const int rows = static_cast<int>(area.y() / (stripes ? 0.7 * wanted : wanted));
+    const int columns = stripes ? 1 : static_cast<int>(area.x() / wanted);
+    const Vector2d cell(area.x() / columns, area.y() / rows);
+    const bool dark = floor_paint_.albedo < 0.3;
+    const Surface tile = tiles  ? near(floor_paint_, 0.6)
+                         : dark ? paint(0.4, 0.8)
+                                : paint(0.04, 0.15);
+    for (int j = 0; j < rows; ++j) {
+      for (int i = 0; i < columns; ++i) {
+        if (!tiles && (i + j) % 2 != 0) continue;
+        builder_.addDecal(
+            floor_,
+            {DecalShape::kRectangle,
+             {kMarginToWall + (i + 0.5) * cell.x(), kMarginToWall + (j + 0.5) * cell.y()},
+             (cell.array() - joint) / 2,
+             0,
+             near(tile, 0.08)});
       }
     }
   }
@@ -348,7 +387,7 @@ class RoomMaker {
       }
       const Box3 box = boxIn(f, {0, 0, 0}, size);
       const Vector3d room_lo(kWallGap - 0.001, kWallGap - 0.001, -1);
-      const Vector3d room_hi(size_.x() - room_lo.x(), size_.y() - room_lo.y(), size_.z() - 0.05);
+      const Vector3d room_hi(size_.x() - room_lo.x(), size_.y() - room_lo.y(), size_.z() + 1e-9);
       const bool inside =
           (box.lo.array() >= room_lo.array()).all() && (box.hi.array() <= room_hi.array()).all();
       if (!inside || !isFree(box)) continue;
@@ -360,21 +399,45 @@ class RoomMaker {
   }
 
   void furnish() {
-    addBookshelf();
-    if (random_.nextBool(0.6)) addBookshelf();
-    addTable();
-    addCabinet();
-    if (random_.nextBool(0.5)) addCabinet();
-    addWireframe();
-    if (random_.nextBool(0.5)) addWireframe();
-    const int chairs = random_.nextInt(1, 3);
+    if (random_.nextBool(0.3)) addColumn();
+    if (random_.nextBool(0.55)) addBookshelf();
+    if (random_.nextBool(0.8)) addTable();
+    if (random_.nextBool(0.5)) addSofa();
+    const int cabinets = random_.nextInt(1, 2);
+    for (int i = 0; i < cabinets; ++i) addCabinet();
+    const int wireframes = random_.nextInt(1, 3);
+    for (int i = 0; i < wireframes; ++i) addWireframe();
+    const int chairs = random_.nextInt(0, 2);
     for (int i = 0; i < chairs; ++i) addChair();
-    const int boxes = random_.nextInt(1, 4);
+    const int boxes = random_.nextInt(2, 5);
     for (int i = 0; i < boxes; ++i) addCartons();
-    if (random_.nextBool(0.6)) addStool();
-    if (random_.nextBool(0.6)) addFloorLamp();
+    if (random_.nextBool(0.4)) addStool();
+    if (random_.nextBool(0.5)) addFloorLamp();
     const int balls = random_.nextInt(0, 3);
     for (int i = 0; i < balls; ++i) addBall();
+  }
+
+  /// From floor to ceiling.
+  void addColumn() {
+    const Vector3d size{random_.next(0.25, 0.5), random_.next(0.25, 0.5), size_.z()};
+    const auto f = place(size, 0.7);
+    if (f) builder_.addBox(*f, {0, 0, 0}, size, anyPaint());
+  }
+
+  /// A seat, a back and arms: large blocks.
+  void addSofa() {
+    const Vector3d size{random_.next(1.3, 2.1), random_.next(0.75, 0.95), random_.next(0.65, 0.9)};
+    const auto f = place(size, 0.7);
+    if (!f) return;
+    const Surface cloth = anyPaint();
+    const double arm = random_.next(0.14, 0.22), seat = random_.next(0.36, 0.44), gap = 0.004;
+    const double back = size.y() - 0.22;
+    builder_.addBox(*f, {0, 0, 0}, {arm, size.y(), seat + 0.15}, cloth);
+    builder_.addBox(*f, {size.x() - arm, 0, 0}, {size.x(), size.y(), seat + 0.15}, cloth);
+    builder_.addBox(
+        *f, {arm + gap, 0.03, 0}, {size.x() - arm - gap, back - gap, seat}, near(cloth, 0.3));
+    builder_.addBox(
+        *f, {arm + gap, back, 0}, {size.x() - arm - gap, size.y(), size.z()}, near(cloth, 0.3));
   }
 
   /// Books (upright boxes) from x0 to x1 on a board; y is the front, +y the back.
@@ -389,14 +452,14 @@ class RoomMaker {
     const Surface series = anyPaint();
     const bool uniform = random_.nextBool(0.3);
     while (true) {
-      const double w = random_.next(0.014, 0.055);
+      const double w = random_.next(0.02, 0.075);
       if (x + w > x1 - 0.004) break;
       const double h = height * random_.next(0.6, 0.93);
       const double d = depth * random_.next(0.6, 0.92);
       const double y = y_front + depth * random_.next(0.01, 0.06);
       const Surface cover = uniform ? near(series, 0.15) : anyPaint();
       const SlabFaces book = builder_.addBox(f, {x, y, z}, {x + w, y + d, z + h}, cover);
-      if (w > 0.025 && random_.nextBool(0.5)) {
+      if (w > 0.03 && random_.nextBool(0.3)) {
         builder_.addDecal(book.front.front,
                           {DecalShape::kRectangle,
                            {w / 2, h * random_.next(0.6, 0.75)},
@@ -410,9 +473,9 @@ class RoomMaker {
   }
 
   void addBookshelf() {
-    const int columns = random_.nextInt(1, 3), rows = random_.nextInt(2, 6);
+    const int columns = random_.nextInt(1, 2), rows = random_.nextInt(2, 5);
     const double board = random_.next(0.018, 0.03), depth = random_.next(0.22, 0.36);
-    const double w = random_.next(0.45, 0.85), h = random_.next(0.27, 0.38);
+    const double w = random_.next(0.5, 0.95), h = random_.next(0.3, 0.48);
     const Vector3d size(columns * (w + board) + board,
                         depth,
                         std::min(size_.z() - 0.15, rows * (h + board) + board));
@@ -432,15 +495,15 @@ class RoomMaker {
     for (const Pocket& p : front.pockets) {
       builder_.nextObject();
       const double what = random_.next(0, 1);
-      if (what < 0.6) {
+      if (what < 0.45) {
         addBooks(
-            *f, p.x0, p.x0 + (p.x1 - p.x0) * random_.next(0.4, 1.0), 0.01, depth - 0.03, p.y0, hh);
-      } else if (what < 0.75) {
+            *f, p.x0, p.x0 + (p.x1 - p.x0) * random_.next(0.25, 0.9), 0.01, depth - 0.03, p.y0, hh);
+      } else if (what < 0.65) {
         const double a = random_.next(0.12, 0.3), b = hh * random_.next(0.4, 0.8);
         const double x = p.x0 + random_.next(0.02, p.x1 - p.x0 - a - 0.02);
         builder_.addBox(
             *f, {x, 0.03, p.y0}, {x + a, 0.03 + std::min(a, depth - 0.06), p.y0 + b}, anyPaint());
-      } else if (what < 0.88) {
+      } else if (what < 0.8) {
         const double r = std::min(0.09, hh * 0.4);
         builder_.addSphere(f->at((p.x0 + p.x1) / 2, depth / 2, p.y0 + r), r, anyPaint());
       }
@@ -453,11 +516,10 @@ class RoomMaker {
     if (!f) return;
     const Surface body = paint(0.15, 0.85);
     const bool drawers = random_.nextBool(0.5);
-    const int columns = std::max(1, static_cast<int>(size.x() / 0.5));
-    const int rows =
-        drawers ? std::max(1, static_cast<int>(size.z() / 0.24)) : random_.nextInt(1, 2);
+    const int columns = std::max(1, static_cast<int>(size.x() / 0.6));
+    const int rows = drawers ? std::max(1, static_cast<int>(size.z() / 0.3)) : 1;
     Panel front = plain(body);
-    const double rim = 0.02, foot = 0.06;
+    const double rim = 0.03, foot = 0.06;
     const double w = (size.x() - rim * (columns + 1)) / columns;
     const double h = (size.z() - foot - rim * (rows + 1)) / rows;
     const double depth = random_.next(0.006, 0.015);
@@ -487,7 +549,7 @@ class RoomMaker {
     const double y_max = size.y() - 0.02;
     while (true) {
       const int what = random_.nextInt(0, 4);
-      const double w = random_.next(0.12, 0.4);
+      const double w = random_.next(0.15, 0.45);
       if (x + w > size.x() - 0.03) break;
       const double z = size.z();
       const double d = std::min(w * random_.next(0.5, 1.2), y_max - 0.06);
@@ -521,7 +583,7 @@ class RoomMaker {
       } else {
         addDeskLamp(f, x + w / 2, y + d / 2, z, std::min(w, d) / 2);
       }
-      x += w + random_.next(0.02, 0.3);
+      x += w + random_.next(0.1, 0.5);
     }
   }
 
@@ -582,11 +644,11 @@ class RoomMaker {
           board.top,
           {DecalShape::kRectangle, centre, Vector2d(0.105, 0.1485) * scale, angle, paper});
       const Vector2d ax(std::cos(angle), std::sin(angle)), ay(-ax.y(), ax.x());
-      for (int line = -2; line <= 2; ++line) {
+      for (int line = -1; line <= 1; ++line) {
         builder_.addDecal(board.top,
                           {DecalShape::kRectangle,
-                           centre + ay * (0.045 * line * scale) + ax * random_.next(-0.01, 0.01),
-                           Vector2d{random_.next(0.04, 0.08), 0.009} * scale,
+                           centre + ay * (0.08 * line * scale) + ax * random_.next(-0.01, 0.01),
+                           Vector2d{random_.next(0.04, 0.08), 0.022} * scale,
                            angle,
                            paint(0.1, 0.5)});
       }
@@ -618,7 +680,7 @@ class RoomMaker {
   }
 
   void addCartons() {
-    const Vector3d size{random_.next(0.25, 0.6), random_.next(0.25, 0.5), random_.next(0.2, 0.45)};
+    const Vector3d size{random_.next(0.3, 0.8), random_.next(0.3, 0.6), random_.next(0.25, 0.7)};
     const bool stacked = random_.nextBool(0.4);
     const auto f = place({size.x(), size.y(), size.z() * (stacked ? 1.8 : 1.0)}, 0.4);
     if (!f) return;
@@ -687,10 +749,9 @@ class RoomMaker {
     const Vector3d size{random_.next(0.5, 1.1), random_.next(0.4, 0.9), random_.next(0.6, 1.7)};
     const auto f = place(size, 0.1);
     if (!f) return;
-    const double radius = random_.next(0.003, 0.011);
+    const double radius = random_.next(0.0015, 0.005);
     const Surface metal = random_.nextBool(0.5) ? paint(0.03, 0.15) : paint(0.5, 0.9);
     const double ball = 2.8 * radius;
-    const int sides = random_.nextBool(0.5) ? 4 : 8;
     std::vector<Vector3d> nodes;
     const auto node = [&](double x, double y, double z) {
       // Nodes stay inside the reserved box and on the floor.
@@ -736,8 +797,7 @@ class RoomMaker {
     for (const auto& [a, b] : links) {
       const Vector3d d = (nodes[b] - nodes[a]).normalized();
       builder_.nextObject();
-      builder_.addRod(
-          nodes[a] + 2.4 * radius * d, nodes[b] - 2.4 * radius * d, radius, sides, metal);
+      builder_.addRod(nodes[a] + 2.4 * radius * d, nodes[b] - 2.4 * radius * d, radius, 4, metal);
     }
   }
 
@@ -745,14 +805,14 @@ class RoomMaker {
 
   void addWallThings() {
     for (int wall = 0; wall < 4; ++wall) {
-      const int count = random_.nextInt(2, 5);
+      const int count = random_.nextInt(2, 4);
       for (int i = 0; i < count; ++i) {
-        const int what = random_.nextInt(0, 4);
+        const int what = random_.nextInt(0, 6);
         if (what <= 1) {
           addPicture(wall);
         } else if (what == 2) {
           addWallBoard(wall);
-        } else if (what == 3) {
+        } else if (what <= 5) {
           addPoster(wall);
         } else {
           addSwitch(wall);
@@ -777,33 +837,33 @@ class RoomMaker {
     return std::nullopt;
   }
 
+  /// A framed picture, its canvas recessed or flush.
   void addPicture(int wall) {
-    const double w = random_.next(0.25, 0.9), h = w * random_.next(0.6, 1.5);
-    const double thick = random_.next(0.012, 0.035), rim = random_.next(0.015, 0.05);
+    const double w = random_.next(0.35, 1.2), h = w * random_.next(0.6, 1.4);
+    const double thick = random_.next(0.01, 0.03), rim = random_.next(0.03, 0.1);
     if (h > 1.1) return;
-    const auto at = placeOnWall(wall, w, h, thick, 1.0, size_.z() - h - 0.2);
+    const auto at = placeOnWall(wall, w, h, thick, 0.9, size_.z() - h - 0.2);
     if (!at) return;
     Frame3 f = SceneBuilder::wallFrame(size_, wall);
     f.origin = f.at(at->x(), at->y(), thick);
     Panel front = plain(anyPaint());
-    front.pockets.push_back(
-        {rim, w - rim, rim, h - rim, thick * 0.4, near(front.surface, 0.1), plain(anyPaint())});
-    const SlabFaces faces = builder_.addSlab(f, w, h, thick, front, front.surface);
-    const int canvas = faces.front.pockets[0].front;
-    const double cw = w - 2 * rim, ch = h - 2 * rim;
-    const Vector2d centre(cw / 2, ch / 2);
-    if (random_.nextBool(0.6)) {
-      const double mat = random_.next(0.65, 0.85);
-      builder_.addDecal(canvas, {DecalShape::kRectangle, centre, centre * mat, 0, anyPaint()});
-      addPrint(canvas, centre, centre * (mat * 0.9));
-    } else {
-      addPrint(canvas, centre, centre * 0.92);
+    const Vector2d inner(w / 2 - rim, h / 2 - rim);
+    if (random_.nextBool(0.35)) {
+      front.pockets.push_back(
+          {rim, w - rim, rim, h - rim, thick * 0.4, near(front.surface, 0.1), plain(anyPaint())});
+      const SlabFaces faces = builder_.addSlab(f, w, h, thick, front, front.surface);
+      addPrint(faces.front.pockets[0].front, inner, inner * 0.85);
+      return;
     }
+    const SlabFaces faces = builder_.addSlab(f, w, h, thick, front, front.surface);
+    const Vector2d centre(w / 2, h / 2);
+    builder_.addDecal(faces.front.front, {DecalShape::kRectangle, centre, inner, 0, anyPaint()});
+    addPrint(faces.front.front, centre, inner * 0.85);
   }
 
   /// Abstract art: cells of a coarse grid, each with a shape.
   void addPrint(int face, const Vector2d& centre, const Vector2d& half) {
-    const int columns = random_.nextInt(1, 3), rows = random_.nextInt(1, 3);
+    const int columns = random_.nextInt(1, 2), rows = random_.nextInt(1, 2);
     const Vector2d cell(2 * half.x() / columns, 2 * half.y() / rows);
     for (int j = 0; j < rows; ++j) {
       for (int i = 0; i < columns; ++i) {
@@ -836,7 +896,7 @@ class RoomMaker {
 
   /// Printed on the wall itself.
   void addPoster(int wall) {
-    const double w = random_.next(0.3, 0.9), h = w * random_.next(0.7, 1.45);
+    const double w = random_.next(0.4, 1.3), h = w * random_.next(0.6, 1.3);
     const auto at = placeOnWall(wall, w, h, 0.005, 0.7, size_.z() - h - 0.15);
     if (!at) return;
     const Vector2d centre = *at + Vector2d(w / 2, h / 2);
@@ -909,12 +969,12 @@ class RoomMaker {
 
   void addLights() {
     Scene& scene = builder_.scene;
-    scene.ambient_up = random_.next(0.22, 0.36);
-    scene.ambient_down = random_.next(0.12, 0.25);
+    scene.ambient_up = random_.next(0.34, 0.5);
+    scene.ambient_down = random_.next(0.2, 0.36);
     Light sun;
     const double a = random_.next(0, 2 * M_PI);
     sun.place = Vector3d{std::cos(a), std::sin(a), random_.next(0.3, 1.0)}.normalized();
-    sun.strength = random_.next(0.2, 0.45);
+    sun.strength = random_.next(0.3, 0.55);
     scene.lights.push_back(sun);
     const int lamps = random_.nextInt(1, 2);
     for (int i = 0; i < lamps; ++i) {
@@ -923,7 +983,7 @@ class RoomMaker {
       lamp.place = {size_.x() * random_.next(0.2, 0.8),
                     size_.y() * random_.next(0.2, 0.8),
                     size_.z() - random_.next(0.15, 0.6)};
-      lamp.strength = random_.next(0.25, 0.55);
+      lamp.strength = random_.next(0.3, 0.6);
       lamp.half_distance = random_.next(1.5, 4);
       scene.lights.push_back(lamp);
     }
