@@ -10,6 +10,7 @@
 
 #include "cameras/batch.h"
 #include "cameras/calibration/calibration.h"
+#include "cameras/calibration/files.h"
 #include "cli/command.h"
 
 namespace dlsd::cli {
@@ -130,11 +131,11 @@ int show(const std::string& path) {
 }  // namespace
 
 Run addCamera(CLI::App& command) {
-  command.require_subcommand(1);
   const auto path = std::make_shared<std::string>();
   CLI::App* show_command = command.add_subcommand(
       "show", "Model, parameters, field of view, domain and conventions of a camera.");
   show_command->add_option("file", *path, "Calibration file, or file:camera if it holds several")
+      ->type_name("FILE")
       ->required();
   const std::string examples =
       "Examples:\n"
@@ -142,7 +143,12 @@ Run addCamera(CLI::App& command) {
       "  dlsd camera show rig.yaml:cam1";
   show_command->footer(examples);
   command.footer(examples);
-  return [path] { return show(*path); };
+  return [path, show_command]() -> int {
+    if (!show_command->parsed()) {
+      throw InputError("camera needs to be told what to do: show (dlsd camera --help)");
+    }
+    return show(*path);
+  };
 }
 
 }  // namespace dlsd::cli

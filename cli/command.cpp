@@ -1,5 +1,6 @@
 #include "cli/command.h"
 
+#include <fcntl.h>
 #include <fmt/format.h>
 #include <unistd.h>
 
@@ -49,6 +50,20 @@ void checkPlaceForFile(const std::string& path) {
   if (!fs::is_directory(folder, error)) {
     throw SystemError(path + ": cannot be written: the folder " + folder.string() +
                       " does not exist");
+  }
+}
+
+QuietLibraries::QuietLibraries() : stderr_copy_(::dup(STDERR_FILENO)) {
+  if (const int nowhere = ::open("/dev/null", O_WRONLY | O_CLOEXEC); nowhere >= 0) {
+    ::dup2(nowhere, STDERR_FILENO);
+    ::close(nowhere);
+  }
+}
+
+QuietLibraries::~QuietLibraries() {
+  if (stderr_copy_ >= 0) {
+    ::dup2(stderr_copy_, STDERR_FILENO);
+    ::close(stderr_copy_);
   }
 }
 

@@ -32,6 +32,19 @@ void complain(std::string_view sentence);
 /// stands there: asked before long work.
 void checkPlaceForFile(const std::string& path);
 
+/// While it lives, nothing that libraries say reaches standard error: codecs comment on bad files
+/// there, and the user is told once, by us. For one thread at a time.
+class QuietLibraries {
+ public:
+  QuietLibraries();
+  ~QuietLibraries();
+  QuietLibraries(const QuietLibraries&) = delete;
+  QuietLibraries& operator=(const QuietLibraries&) = delete;
+
+ private:
+  int stderr_copy_;
+};
+
 /// Progress on standard error with rate and remaining time, on one line that is cleared at the end.
 /// Says nothing if standard error is not a terminal.
 class Progress {

@@ -96,7 +96,10 @@ int run(const Arguments& arguments) {
       Detector& detector = detectors.at(task.camera);
       const Camera& camera = detector.camera();
       try {
-        const Image image = readImage(task.path);
+        const Image image = [&] {
+          const QuietLibraries quiet;
+          return readImage(task.path);
+        }();
         if (image.width != camera.width() || image.height != camera.height()) {
           throw InputError(fmt::format("{}: is {}x{} px, its camera {} is {}x{} px",
                                        task.path,
@@ -144,18 +147,26 @@ int run(const Arguments& arguments) {
 
 Run addDetect(CLI::App& command) {
   const auto arguments = std::make_shared<Arguments>();
-  command.add_option(
-      "--camera", arguments->camera, "Calibration file, or file:camera if it holds several");
-  command.add_option("images", arguments->images, "Images, all of the camera's size");
-  command.add_option(
-      "--data", arguments->data, "Dataset: all its images, each with its own camera");
+  command
+      .add_option(
+          "--camera", arguments->camera, "Calibration file, or file:camera if it holds several")
+      ->type_name("FILE");
+  command.add_option("images", arguments->images, "Images, all of the camera's size")
+      ->type_name("FILE");
+  command
+      .add_option("--data", arguments->data, "Dataset: all its images, each with its own camera")
+      ->type_name("DIR");
   command
       .add_option(
           "--out", arguments->out, "Detections, one JSON object per line; - is standard output")
+      ->type_name("FILE")
       ->capture_default_str();
   command.add_flag("--paper", arguments->paper, "The algorithm as published, not the default");
-  command.add_option(
-      "--overlay", arguments->overlay, "Folder for PNG images with the detections drawn on them");
+  command
+      .add_option("--overlay",
+                  arguments->overlay,
+                  "Folder for PNG images with the detections drawn on them")
+      ->type_name("DIR");
   command.add_flag(
       "--time", arguments->time, "Add time_ms: how long detection took, reading apart");
   command.footer(

@@ -123,22 +123,30 @@ int run(Arguments& arguments) {
 Run addEvaluate(CLI::App& command) {
   const auto arguments = std::make_shared<Arguments>();
   arguments->detectors = {"dlsd"};
-  command.add_option("--data", arguments->data, "Dataset folder")->required();
-  auto* detections = command.add_option(
-      "--detections", arguments->detections, "Detections of any program, one JSON object per line");
+  command.add_option("--data", arguments->data, "Dataset folder")->type_name("DIR")->required();
+  auto* detections = command
+                         .add_option("--detections",
+                                     arguments->detections,
+                                     "Detections of any program, one JSON object per line")
+                         ->type_name("FILE");
   command
       .add_option(
           "--detector", arguments->detectors, "Built-in detectors to run instead: dlsd, dlsd-paper")
+      ->type_name("NAME")
       ->capture_default_str()
       ->delimiter(',')
       ->excludes(detections);
   command.add_option("--rho", arguments->options.rho_px, "Tolerances in px")
+      ->type_name("PX")
       ->capture_default_str()
       ->delimiter(',');
-  command.add_option("--json", arguments->json, "Write the figures to this file, too");
-  command.add_option("--min-recall",
-                     arguments->min_recall,
-                     "SHARE@RHO: exit with 1 if fewer headline labels are found");
+  command.add_option("--json", arguments->json, "Write the figures to this file, too")
+      ->type_name("FILE");
+  command
+      .add_option("--min-recall",
+                  arguments->min_recall,
+                  "Exit with 1 if a smaller share of the headline labels is found at this rho")
+      ->type_name("SHARE@RHO");
   command.add_option("--jobs", arguments->jobs, "Threads; 0: one per core")
       ->capture_default_str()
       ->check(CLI::Range(0, 1024));

@@ -86,14 +86,17 @@ Run addGenerate(CLI::App& command) {
           arguments->cameras,
           "Calibration file, or file:camera if it holds several; may be repeated: frames go "
           "round")
+      ->type_name("FILE")
       ->required()
       ->expected(1)
       ->take_all();
-  command.add_option("--out", options.out, "Folder for the dataset")->required();
+  command.add_option("--out", options.out, "Folder for the dataset")->type_name("DIR")->required();
   command.add_option("--scene", options.scene, "Scene preset: room or paper")
+      ->type_name("NAME")
       ->capture_default_str();
   command.add_option("--count", options.count, "Frames")->capture_default_str();
   command.add_option("--seed", options.seed, "Seed; the same seed gives the same bytes")
+      ->check(CLI::NonNegativeNumber)  // CLI11 would wrap -1 around
       ->capture_default_str();
   command
       .add_option(
@@ -103,11 +106,13 @@ Run addGenerate(CLI::App& command) {
       .add_option("--psf", options.sensor.psf_sigma_px, "Optical blur, standard deviation in px")
       ->capture_default_str();
   command.add_option("--encoding", arguments->encoding, "Light to grey levels: linear or srgb")
+      ->type_name("NAME")
       ->capture_default_str()
       ->check(CLI::IsMember({"linear", "srgb"}));
   command.add_option("--jobs", options.jobs, "Threads; 0: one per core")->capture_default_str();
-  command.add_option(
-      "--shard", arguments->shard, "i/n: make only the frames with number mod n = i");
+  command
+      .add_option("--shard", arguments->shard, "i/n: make only the frames with number mod n = i")
+      ->type_name("I/N");
   command.footer(
       "Examples:\n"
       "  dlsd generate --camera wide.yaml --count 100 --out data\n"

@@ -36,7 +36,6 @@ int run(int argc, char** argv) {
   CLI::App app{"Distorted straight line segments: exact synthetic data, detection, evaluation."};
   app.name("dlsd");
   app.set_version_flag("--version", "dlsd " DLSD_VERSION);
-  app.require_subcommand(1);
   app.footer("dlsd COMMAND --help shows the options of a command and examples.");
   std::vector<std::pair<CLI::App*, Run>> commands;
   for (const Entry& entry : kCommands) {
@@ -59,6 +58,7 @@ int run(int argc, char** argv) {
       return execute();
     }
   }
+  complain("a command is needed: generate, detect, evaluate, camera or report (dlsd --help)");
   return kBadInput;
 }
 

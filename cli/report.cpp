@@ -39,12 +39,17 @@ int run(Arguments& arguments) {
 
 Run addReport(CLI::App& command) {
   const auto arguments = std::make_shared<Arguments>();
-  command.add_option("--data", arguments->data, "Dataset folder")->required();
-  command.add_option("--out", arguments->options.out, "Folder for the page")->required();
-  command.add_option("--detections",
-                     arguments->detections,
-                     "Detections to show and evaluate, one JSON object per line");
+  command.add_option("--data", arguments->data, "Dataset folder")->type_name("DIR")->required();
+  command.add_option("--out", arguments->options.out, "Folder for the page")
+      ->type_name("DIR")
+      ->required();
+  command
+      .add_option("--detections",
+                  arguments->detections,
+                  "Detections to show and evaluate, one JSON object per line")
+      ->type_name("FILE");
   command.add_option("--rho", arguments->options.evaluation.rho_px, "Tolerances in px")
+      ->type_name("PX")
       ->capture_default_str()
       ->delimiter(',');
   command.add_option("--jobs", arguments->options.jobs, "Threads; 0: one per core")

@@ -1,0 +1,387 @@
+// The program as a user meets it: exit codes, one sentence per error, nothing half-written.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+namespace {
+
+namespace fs = std::filesystem;
+using testing::AnyOf;
+using testing::EndsWith;
+using testing::HasSubstr;
+using testing::StartsWith;
+
+std::string contentOf(const fs::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  std::ostringstream text;
+  text << file.rdbuf();
+  return text.str();
+}
+
+struct Result {
+  int code = -1;
+  std::string out, err;
+};
+
+struct Cli : testing::Test {
+  fs::path folder = fs::temp_directory_path() / ("dlsd-cli-test-" + std::to_string(::getpid()));
+
+  void SetUp() override {
+    fs::remove_all(folder);
+    fs::create_directories(folder);
+    write("wide.yaml", kWide);
+  }
+  void TearDown() override { fs::remove_all(folder); }
+
+  /// A FoV camera of 160 x 120 px: all commands together take a fraction of a second.
+  static constexpr const char* kWide =
+      "cam0:\n"
+      "  camera_model: pinhole\n"
+      "  distortion_model: fov\n"
+      "  intrinsics: [56.0, 56.0, 79.5, 59.5]\n"
+      "  distortion_coeffs: [0.93]\n"
+      "  resolution: [160, 120]\n";
+
+  void write(const std::string& name, const std::string& content) const {
+    std::ofstream(folder / name, std::ios::binary) << content;
+  }
+
+  /// Runs dlsd in the folder, `arguments` as typed into a shell.
+  [[nodiscard]] Result dlsd(const std::string& arguments) const {
+    const fs::path out = folder / ".stdout";
+    const fs::path err = folder / ".stderr";
+    const std::string command = "cd '" + folder.string() + "' && '" DLSD_BINARY "' " + arguments +
+                                " >.stdout 2>.stderr </dev/null";
+    const int status = std::system(command.c_str());
+    Result result{WIFEXITED(status) ? WEXITSTATUS(status) : -1, contentOf(out), contentOf(err)};
+    fs::remove(out);
+    fs::remove(err);
+    return result;
+  }
+
+  /// Everything in the folder, sorted.
+  [[nodiscard]] std::vector<std::string> files() const {
+    std::vector<std::string> names;
+    for (const auto& entry : fs::recursive_directory_iterator(folder)) {
+      names.push_back(entry.path().lexically_relative(folder).generic_string());
+    }
+    std::sort(names.begin(), names.end());
+    return names;
+  }
+
+  /// The command fails with one sentence that holds `part`, prints nothing and leaves nothing
+  /// behind.
+  void expectRefused(const std::string& arguments, int code, const std::string& part) const {
+    SCOPED_TRACE("dlsd " + arguments);
+    const auto before = files();
+    const Result result = dlsd(arguments);
+    EXPECT_EQ(result.code, code);
+    EXPECT_EQ(result.out, "");
+    EXPECT_THAT(result.err, StartsWith("dlsd: "));
+    EXPECT_THAT(result.err, EndsWith("\n"));
+    EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
+    EXPECT_THAT(result.err, HasSubstr(part));
+    EXPECT_EQ(files(), before);
+  }
+
+  void generate(const std::string& more = "") const {
+    const Result result = dlsd("generate --camera wide.yaml --count 2 --seed 3 --out data " + more);
+    ASSERT_EQ(result.code, 0) << result.err;
+  }
+};
+
+TEST_F(Cli, HelpShowsExamples) {
+  for (const char* command :
+       {"generate", "detect", "evaluate", "camera", "camera show", "report"}) {
+    SCOPED_TRACE(command);
+    const Result result = dlsd(std::string(command) + " --help");
+    EXPECT_EQ(result.code, 0);
+    EXPECT_EQ(result.err, "");
+    EXPECT_THAT(result.out, HasSubstr(std::string("\n  dlsd ") + command));
+  }
+  const Result result = dlsd("--help");
+  EXPECT_EQ(result.code, 0);
+  EXPECT_THAT(result.out, HasSubstr("evaluate"));
+  EXPECT_THAT(dlsd("--version").out, testing::MatchesRegex("dlsd [0-9]+\\.[0-9]+\\.[0-9]+\n"));
+}
+
+TEST_F(Cli, UsageErrorsAreTwo) {
+  expectRefused("", 2, "command");
+  expectRefused("paint", 2, "paint");
+  expectRefused("generate --out data", 2, "--camera");
+  expectRefused("generate --camera wide.yaml --out data --colour red", 2, "--colour");
+  expectRefused("generate --camera wide.yaml --out data --count many", 2, "many");
+  expectRefused("generate --camera wide.yaml --out data --count 0", 2, "count");
+  expectRefused("generate --camera wide.yaml --out data --count 99999999999999999999", 2, "count");
+  expectRefused("generate --camera wide.yaml --out data --seed -1", 2, "seed");
+  expectRefused("generate --camera wide.yaml --out data --noise nan", 2, "noise");
+  expectRefused("generate --camera wide.yaml --out data --noise -1", 2, "noise");
+  expectRefused("generate --camera wide.yaml --out data --psf x", 2, "psf");
+  expectRefused("generate --camera wide.yaml --out data --scene moon", 2, "moon");
+  expectRefused("generate --camera wide.yaml --out data --encoding rot13", 2, "rot13");
+  expectRefused("generate --camera wide.yaml --out data --shard 4/4", 2, "shard");
+  expectRefused("generate --camera wide.yaml --out data --shard 1of4", 2, "1of4");
+  expectRefused("generate --camera wide.yaml --camera wide.yaml --out data", 2, "wide");
+  expectRefused("detect --camera wide.yaml", 2, "images");
+  expectRefused("detect --camera wide.yaml --data data", 2, "--data");
+  expectRefused("camera", 2, "show");
+  expectRefused("camera mend wide.yaml", 2, "mend");
+  expectRefused("camera show", 2, "file");
+}
+
+TEST_F(Cli, BadCameraFilesAreTwo) {
+  write("truncated.yaml", std::string(kWide).substr(0, 70));
+  write("not.yaml", "cam0: [1, 2\n");
+  std::string text = kWide;
+  write("range.yaml", text.replace(text.find("0.93"), 4, "9.93"));
+  text = kWide;
+  write("size.yaml", text.replace(text.find("160"), 3, "0"));
+  text = kWide;
+  write("model.yaml", text.replace(text.find("fov"), 3, "fob"));
+  write("empty.yaml", "");
+  const struct {
+    const char *file, *part;
+  } cases[] = {{"missing.yaml", "missing.yaml"},
+               {"truncated.yaml", "truncated.yaml"},
+               {"not.yaml", "not.yaml"},
+               {"range.yaml", "9.93"},
+               {"size.yaml", "size.yaml"},
+               {"model.yaml", "fob"},
+               {"empty.yaml", "empty.yaml"},
+               {"wide.yaml:cam7", "cam7"},
+               {".", "."}};
+  for (const auto& c : cases) {
+    expectRefused(std::string("camera show ") + c.file, 2, c.part);
+  }
+  expectRefused("generate --out data --camera wide.yaml --camera range.yaml", 2, "9.93");
+  expectRefused("detect x.png --camera range.yaml", 2, "9.93");
+}
+
+TEST_F(Cli, CameraShowTellsModelViewDomainAndConventions) {
+  const Result result = dlsd("camera show wide.yaml:cam0");
+  EXPECT_EQ(result.code, 0) << result.err;
+  for (const char* part : {"fov",
+                           "160 x 120 px",
+                           "0.93 rad",
+                           "56 px",
+                           "(79.5, 59.5) if (0, 0) is the centre",
+                           "(80, 60) if (0, 0) is its corner",
+                           "horizontal view",
+                           "vertical view",
+                           "diagonal view",
+                           "180.0000 deg",
+                           "19200/19200 100.00 %"}) {
+    EXPECT_THAT(result.out, HasSubstr(part));
+  }
+}
+
+TEST_F(Cli, FromGenerateToReport) {
+  generate();
+  Result result = dlsd("detect --data data --time --out det.jsonl --overlay overlays");
+  ASSERT_EQ(result.code, 0) << result.err;
+  EXPECT_EQ(result.out, "");
+  EXPECT_EQ(result.err, "");  // no progress where there is no terminal
+  EXPECT_TRUE(fs::exists(folder / "overlays/000001.png"));
+  std::istringstream lines(contentOf(folder / "det.jsonl"));
+  size_t count = 0;
+  for (std::string line; std::getline(lines, line); ++count) {
+    const auto json = nlohmann::json::parse(line);
+    EXPECT_EQ(json.at("format"), "dlsd-detections/1");
+    EXPECT_EQ(json.at("image"), "images/00000" + std::to_string(count) + ".png");
+    EXPECT_GE(json.at("time_ms"), 0);
+  }
+  EXPECT_EQ(count, 2U);
+
+  result = dlsd("evaluate --data data --detections det.jsonl --json from_file.json --jobs 1");
+  ASSERT_EQ(result.code, 0) << result.err;
+  EXPECT_THAT(result.out, HasSubstr("headline"));
+  // The same detector run inside gives the same figures, to the last digit.
+  ASSERT_EQ(dlsd("evaluate --data data --json inside.json --jobs 2").code, 0);
+  auto from_file = nlohmann::json::parse(contentOf(folder / "from_file.json")).at("results").at(0);
+  auto inside = nlohmann::json::parse(contentOf(folder / "inside.json")).at("results").at(0);
+  EXPECT_EQ(from_file.at("detections"), "det.jsonl");
+  EXPECT_EQ(inside.at("detections"), "dlsd");
+  EXPECT_EQ(from_file.at("all"), inside.at("all"));
+  EXPECT_EQ(from_file.at("all").at("frames"), 2);
+
+  result = dlsd("evaluate --data data --detector dlsd,dlsd-paper --rho 4,2");
+  ASSERT_EQ(result.code, 0) << result.err;
+  EXPECT_THAT(result.out, HasSubstr("== dlsd ==\n"));
+  EXPECT_THAT(result.out, HasSubstr("== dlsd-paper ==\n"));
+
+  result = dlsd("report --data data --detections det.jsonl --out gallery");
+  ASSERT_EQ(result.code, 0) << result.err;
+  EXPECT_THAT(result.out, EndsWith("\ngallery/index.html\n"));
+  EXPECT_THAT(result.out, HasSubstr("labels a frame, median"));
+  EXPECT_TRUE(fs::exists(folder / "gallery/index.html"));
+  EXPECT_TRUE(fs::exists(folder / "gallery/frames/000001.js"));
+}
+
+TEST_F(Cli, DetectionIsTheSameToStdoutAndFileAndForEachWayToNameTheImages) {
+  generate();
+  const Result to_stdout = dlsd("detect --camera wide.yaml data/images/000000.png --out -");
+  EXPECT_EQ(to_stdout.code, 0) << to_stdout.err;
+  ASSERT_EQ(dlsd("detect --camera wide.yaml data/images/000000.png --out det.jsonl").code, 0);
+  EXPECT_EQ(to_stdout.out, contentOf(folder / "det.jsonl"));
+  const auto by_camera = nlohmann::json::parse(to_stdout.out);
+  const Result by_data = dlsd("detect --data data");
+  const auto first = nlohmann::json::parse(by_data.out.substr(0, by_data.out.find('\n')));
+  EXPECT_EQ(by_camera.at("lines"), first.at("lines"));
+  EXPECT_EQ(by_camera.at("image"), "data/images/000000.png");
+  EXPECT_FALSE(by_camera.contains("time_ms"));
+}
+
+TEST_F(Cli, OneBadImageAmongManyIsNamedAndTheOthersAreDone) {
+  generate();
+  write("bad.png", "no image");
+  const Result result = dlsd(
+      "detect --camera wide.yaml data/images/000000.png bad.png data/images/000001.png --out "
+      "d.jsonl");
+  EXPECT_EQ(result.code, 2);
+  EXPECT_THAT(result.err, HasSubstr("bad.png"));
+  EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1);
+  const std::string text = contentOf(folder / "d.jsonl");
+  EXPECT_EQ(std::count(text.begin(), text.end(), '\n'), 2);
+}
+
+TEST_F(Cli, BadImagesAreTwo) {
+  generate();
+  write("bad.png", "no image");
+  const std::string png = contentOf(folder / "data/images/000000.png");
+  write("half.png", png.substr(0, png.size() / 2));
+  std::string other = kWide;
+  write("other.yaml", other.replace(other.find("120"), 3, "121"));
+  expectRefused("detect --camera wide.yaml missing.png", 2, "missing.png");
+  expectRefused("detect --camera wide.yaml bad.png --out d.jsonl", 2, "bad.png");
+  expectRefused("detect --camera wide.yaml half.png --out d.jsonl", 2, "half.png");
+  expectRefused("detect --camera wide.yaml data --out d.jsonl", 2, "data");
+  expectRefused("detect --camera other.yaml data/images/000000.png --out d.jsonl",
+                2,
+                "data/images/000000.png: is 160x120 px, its camera other.yaml is 160x121 px");
+}
+
+TEST_F(Cli, UnwritableOutputsAreThree) {
+  generate();
+  ASSERT_EQ(dlsd("detect --data data --out det.jsonl").code, 0);
+  write("file", "stands here");
+  const std::string detect = "detect --camera wide.yaml data/images/000000.png --out ";
+  expectRefused("generate --camera wide.yaml --count 1 --out file", 3, "file");
+  expectRefused("generate --camera wide.yaml --count 1 --out file/data", 3, "file");
+  expectRefused("generate --camera wide.yaml --count 1 --out /proc/dlsd", 3, "/proc/dlsd");
+  expectRefused(detect + "file/d.jsonl", 3, "file/d.jsonl");
+  expectRefused(detect + "nowhere/d.jsonl", 3, "nowhere");
+  expectRefused(detect + "data", 3, "data");
+  expectRefused(detect + "/dev/full", 3, "/dev/full");
+  expectRefused(detect + "d.jsonl --overlay file", 3, "file");
+  expectRefused("evaluate --data data --json nowhere/e.json", 3, "nowhere");
+  expectRefused("evaluate --data data --json /dev/full", 3, "/dev/full");
+  expectRefused("report --data data --out file", 3, "file");
+  expectRefused("report --data data --detections det.jsonl --out /proc/dlsd", 3, "/proc/dlsd");
+  EXPECT_EQ(contentOf(folder / "file"), "stands here");
+  for (const char* command :
+       {"camera show wide.yaml", "detect --data data", "evaluate --data data"}) {
+    SCOPED_TRACE(command);
+    const std::string full =
+        "cd '" + folder.string() + "' && '" DLSD_BINARY "' " + command + " >/dev/full 2>.stderr";
+    const int status = std::system(full.c_str());
+    EXPECT_EQ(WEXITSTATUS(status), 3);
+    EXPECT_THAT(contentOf(folder / ".stderr"),
+                StartsWith("dlsd: standard output: cannot be written"));
+  }
+}
+
+TEST_F(Cli, BadDataAndDetectionsAreTwo) {
+  generate();
+  fs::create_directories(folder / "empty");
+  expectRefused("evaluate --data missing", 2, "missing");
+  expectRefused("evaluate --data empty", 2, "manifest.json");
+  expectRefused("report --data empty --out gallery", 2, "manifest.json");
+  expectRefused("report --data data --out data", 2, "data");
+  expectRefused("detect --data empty", 2, "manifest.json");
+  expectRefused("evaluate --data data --detections missing.jsonl", 2, "missing.jsonl");
+  expectRefused("evaluate --data data --detector lsd", 2, "lsd");
+  expectRefused("evaluate --data data --detector dlsd --detections x", 2, "--detect");
+  expectRefused("evaluate --data data --rho 0", 2, "rho");
+  expectRefused("evaluate --data data --rho nan", 2, "rho");
+  expectRefused("evaluate --data data --rho 1,x", 2, "x");
+  expectRefused("evaluate --data data --jobs -1", 2, "-1");
+  expectRefused("evaluate --data data --min-recall 0.9", 2, "0.9");
+  expectRefused("evaluate --data data --min-recall 98@1", 2, "98@1");
+  expectRefused("evaluate --data data --min-recall nan@1", 2, "nan@1");
+  expectRefused("evaluate --data data --min-recall 0.9@3", 2, "one of 1, 2, 4");
+
+  const std::string empty = R"({"image": "images/000000.png", "lines": []})"
+                            "\n";
+  const auto detections = [&](const std::string& points) {
+    return empty + R"({"image": "images/000001.png", "lines": [{"points": )" + points + "}]}\n";
+  };
+  const struct {
+    std::string content, part;
+  } cases[] = {
+      {"{", "d.jsonl line 1"},
+      {empty, "images/000001.png"},
+      {empty + empty, "the same image"},
+      {detections("[[1, 2]]"), "d.jsonl line 2"},
+      {detections("[[1, 2], [3, 1e999]]"), "d.jsonl line 2"},
+      {detections("[[1, 2], [3, null]]"), "d.jsonl line 2"},
+      {detections("[[1, 2], [1, 2]]"), "has no length"},
+      {detections("[[1, 2], [1e7, 2]]"), "images/000001.png: detection 0"},
+      {detections("[[1, 2], [9, 2]]") + R"({"image": "zebra.png", "lines": []})", "zebra.png"}};
+  for (const auto& c : cases) {
+    write("d.jsonl", c.content);
+    expectRefused("evaluate --data data --detections d.jsonl --json e.json", 2, c.part);
+    expectRefused("report --data data --detections d.jsonl --out gallery", 2, c.part);
+  }
+  write("d.jsonl", detections("[[1, 2], [9, 2]]"));
+  EXPECT_EQ(dlsd("evaluate --data data --detections d.jsonl").code, 0);
+}
+
+TEST_F(Cli, MinRecallIsAGate) {
+  generate();
+  const std::string nothing = R"({"image": "images/000000.png", "lines": []})"
+                              "\n"
+                              R"({"image": "images/000001.png", "lines": []})"
+                              "\n";
+  write("nothing.jsonl", nothing);
+  Result result = dlsd("evaluate --data data --detections nothing.jsonl --min-recall 0.5@4");
+  EXPECT_EQ(result.code, 1);
+  EXPECT_EQ(result.err, "");
+  EXPECT_THAT(result.out,
+              HasSubstr("\nfailed: nothing.jsonl: headline labels found at rho = 4 px are 0/"));
+
+  // The labels themselves as detections find every label.
+  std::string perfect;
+  for (const char* number : {"000000", "000001"}) {
+    const auto label =
+        nlohmann::json::parse(contentOf(folder / "data/labels" / (std::string(number) + ".json")));
+    nlohmann::json record{{"image", label.at("image")}, {"lines", nlohmann::json::array()}};
+    for (const auto& line : label.at("lines")) {
+      record["lines"].push_back({{"points", line.at("points")}});
+    }
+    perfect += record.dump() + "\n";
+  }
+  write("perfect.jsonl", perfect);
+  result = dlsd(
+      "evaluate --data data --detections perfect.jsonl --rho 0.02 --json e.json --min-recall "
+      "1@0.02");
+  EXPECT_EQ(result.code, 0) << result.out << result.err;
+  const auto all =
+      nlohmann::json::parse(contentOf(folder / "e.json")).at("results").at(0).at("all");
+  for (const auto& [stratum, found] : all.at("at_rho").at(0).at("found").items()) {
+    EXPECT_EQ(found.at("counted"), found.at("total")) << stratum;
+  }
+  const auto& right = all.at("at_rho").at(0).at("right");
+  EXPECT_EQ(right.at("counted"), right.at("total"));
+  EXPECT_GT(right.at("total"), 0);
+}
+
+}  // namespace
