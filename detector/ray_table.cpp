@@ -7,16 +7,19 @@
 namespace dlsd {
 namespace {
 
-/// out[i] = 1 if any in[j] is, |i - j| <= radius, for `count` entries `stride` apart.
-void dilate(const uint8_t* in, uint8_t* out, int count, size_t stride, int radius) {
-  int last_set = -radius - 1;  // last set entry at or before i + radius
-  for (int i = -radius; i < count; ++i) {
-    const int ahead = i + radius;
-    if (ahead < count && in[static_cast<size_t>(ahead) * stride] != 0) last_set = ahead;
-    if (i >= 0) {
-      out[static_cast<size_t>(i) * stride] = static_cast<uint8_t>(last_set >= i - radius);
+/// Distance along a line of `count` entries, `stride` apart, to the nearest one that is set; `far`
+/// where that is farther or there is none.
+void distanceAlong(const uint8_t* set, uint8_t* distance, int count, size_t stride, uint8_t far) {
+  const auto sweep = [&](int begin, int step, bool first) {
+    uint8_t d = far;
+    for (int n = 0, i = begin; n < count; ++n, i += step) {
+      const size_t k = static_cast<size_t>(i) * stride;
+      d = set[k] != 0 ? uint8_t{0} : static_cast<uint8_t>(std::min<int>(d + 1, far));
+      distance[k] = first ? d : std::min(distance[k], d);
     }
-  }
+  };
+  sweep(0, 1, true);
+  sweep(count - 1, -1, false);
 }
 
 }  // namespace
@@ -29,8 +32,7 @@ RayTable::RayTable(const Camera& camera)
   const size_t w = static_cast<size_t>(width_);
   std::vector<double> u(w), v(w), x(w), y(w), z(w);
   std::vector<uint8_t> valid(w);
-  std::vector<uint8_t> has_no_ray(entries_.size()), near_row(entries_.size()),
-      near(entries_.size());
+  std::vector<uint8_t> has_no_ray(entries_.size()), row_distance(entries_.size());
   for (size_t i = 0; i < w; ++i) u[i] = static_cast<double>(i);
   for (int row = 0; row < height_; ++row) {
     std::fill(v.begin(), v.end(), row);
@@ -46,17 +48,20 @@ RayTable::RayTable(const Camera& camera)
       e.has_ray = 1;
     }
   }
+  constexpr uint8_t kFar = kRimPx + 1;
   for (int row = 0; row < height_; ++row) {
     const size_t offset = static_cast<size_t>(row) * w;
-    dilate(&has_no_ray[offset], &near_row[offset], width_, 1, kRimPx);
-  }
-  for (size_t column = 0; column < w; ++column) {
-    dilate(&near_row[column], &near[column], height_, w, kRimPx);
+    distanceAlong(&has_no_ray[offset], &row_distance[offset], width_, 1, kFar);
   }
   for (int row = kBorderPx; row < height_ - kBorderPx; ++row) {
     for (int column = kBorderPx; column < width_ - kBorderPx; ++column) {
-      const size_t i = index(column, row);
-      if (near[i] == 0) usable_[i] = 0xffff;
+      bool near_rim = false;
+      for (int dy = -kRimPx; dy <= kRimPx && !near_rim; ++dy) {
+        if (row + dy < 0 || row + dy >= height_) continue;
+        const int dx = row_distance[index(column, row + dy)];
+        near_rim = dx * dx + dy * dy <= kRimPx * kRimPx;
+      }
+      if (!near_rim) usable_[index(column, row)] = 0xffff;
     }
   }
 }
