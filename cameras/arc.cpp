@@ -192,7 +192,9 @@ double Arc::angleToPlane(const Eigen::Vector3d& unit_ray) const {
 
 std::optional<Arc> arcBetween(const Eigen::Vector3d& from, const Eigen::Vector3d& to) {
   const Eigen::Vector3d a = from.normalized(), b = to.normalized();
-  const Eigen::Vector3d n = a.cross(b);
+  // a x (b - a) = a x b = a x (b + a), whichever factor is small: without it, nearly (anti)parallel
+  // rays would leave a normal that is perpendicular to neither.
+  const Eigen::Vector3d n = a.cross(a.dot(b) > 0 ? Eigen::Vector3d(b - a) : Eigen::Vector3d(b + a));
   const double sine = n.norm();
   if (!(sine > 1e-12)) return std::nullopt;
   return Arc{n / sine, a, b};
@@ -275,6 +277,8 @@ std::vector<ImageSpan> imageSpans(const Camera& camera, const Arc& arc) {
 std::vector<Eigen::Vector2d> imageCurve(
     const Camera& camera, const Arc& arc, double t0, double t1, double max_chord_err_px) {
   const ArcSampler sampler(arc);
+  // The curve may be a little further from its chord beside the middle, where it is measured.
+  const double tolerance = 0.9 * max_chord_err_px;
   std::vector<Eigen::Vector2d> points;
   points.reserve(64);
   // Four pieces to start from, each looked at in three inner points, so that a long S-shaped curve
@@ -298,7 +302,7 @@ std::vector<Eigen::Vector2d> imageCurve(
       const auto next = i == parts ? p : camera.project(sampler.at(t_next));
       if (!next) continue;
       if (left) {
-        refine(camera, sampler, t_left, *left, t_next, *next, max_chord_err_px, 16, &points);
+        refine(camera, sampler, t_left, *left, t_next, *next, tolerance, 16, &points);
       }
       points.push_back(*next);
       left = next;
@@ -315,13 +319,13 @@ std::vector<Eigen::Vector2d> imageCurve(
     }
     if (!complete) {
       for (size_t j = 1; j <= kInner; ++j) extend(coarse_t(i + j), coarse[i + j], 1);
-    } else if (bend <= max_chord_err_px) {
+    } else if (bend <= tolerance) {
       points.push_back(*coarse[i + kInner]);
       left = coarse[i + kInner];
       t_left = coarse_t(i + kInner);
     } else {
       // The distance to the chord falls with the square of the number of parts.
-      const double parts = std::ceil(std::sqrt(1.2 * bend / max_chord_err_px));
+      const double parts = std::ceil(std::sqrt(1.1 * bend / tolerance));
       extend(coarse_t(i + kInner), coarse[i + kInner], static_cast<int>(std::min(parts, 1e3)));
     }
   }

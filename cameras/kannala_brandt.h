@@ -87,7 +87,7 @@ struct KannalaBrandt {
     // Each step at least halves the bracket or the step before the last: 200 bound the worst fold.
     for (int i = 0; i < 200; ++i) {
       const T f = distort(theta) - r_d;
-      if (f == T(0)) return theta;
+      if (f == T(0)) break;
       (f < T(0) ? lo : hi) = theta;
       T next = theta - f / distortSlope(theta);
       if (!(next > lo && next < hi && std::abs(next - theta) <= last_step / 2)) {
@@ -97,7 +97,12 @@ struct KannalaBrandt {
       theta = next;
       if (last_step <= std::numeric_limits<T>::epsilon() / 2 * theta) break;
     }
-    return theta;
+    // What the polynomial's own rounding leaves, by one more step in higher precision.
+    const auto slope = static_cast<long double>(distortSlope(theta));
+    const long double correction =
+        (distort(static_cast<long double>(theta)) - static_cast<long double>(r_d)) / slope;
+    const T polished = static_cast<T>(static_cast<long double>(theta) - correction);
+    return polished >= lo && polished <= hi ? polished : theta;
   }
 
   [[nodiscard]] ProjectionJacobian jacobian(double x, double y, double z) const {

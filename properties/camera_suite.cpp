@@ -235,7 +235,9 @@ TYPED_TEST(CameraSuite, RaysComeBack) {
       if (!back) continue;  // ValidOneWayImpliesValidBack looks at these.
       // Where either answer is right, neither is measured: at -z the Jacobian is not even finite.
       if (!(fieldAngle(ray) < camera.maxFieldAngle() * (1 - kBand))) continue;
-      const double smallest = singularValues(*camera.jacobian(ray)).smallest;
+      const auto [largest, smallest] = singularValues(*camera.jacobian(ray));
+      // The decomposition knows the smallest one to rounding of the largest.
+      if (!(smallest > kBand * largest)) continue;
       const double error = angleBetween(ray, *back);
       double allowed = kRayRoundTripUlps * pixelUlp(camera, *pixel) / smallest;
       const bool ordinary = range == Range::kRealistic && camera.inImage(*pixel);
@@ -399,7 +401,7 @@ TYPED_TEST(CameraSuite, ValidImpliesFiniteAndUnit) {
 }
 
 TYPED_TEST(CameraSuite, TheLengthOfARayDoesNotMatter) {
-  Worst worst("difference, in units of 8 ulp(px) + largest singular value * ray resolution");
+  Worst worst("difference, in units of 8 ulp(px) + 2 * largest singular value * ray resolution");
   holds([&] {
     const Camera camera = *genCamera<TypeParam>(drawRange());
     const double scale = *genLogReal(1e-95, 1e95);
@@ -412,7 +414,8 @@ TYPED_TEST(CameraSuite, TheLengthOfARayDoesNotMatter) {
       }
       if (!a || !b) continue;
       const double largest = singularValues(*camera.jacobian(ray)).largest;
-      const double allowed = 8 * pixelUlp(camera, *a) + largest * kRayResolution;
+      // Scaling rounds the ray itself, too.
+      const double allowed = 8 * pixelUlp(camera, *a) + 2 * largest * kRayResolution;
       worst.see((*a - *b).norm() / allowed);
       if (!((*a - *b).norm() <= allowed)) RC_FAIL(describe(camera, ray));
     }
@@ -511,8 +514,8 @@ TYPED_TEST(CameraSuite, TheImageIsContinuousAcrossTheAxis) {
     const auto J = camera.jacobian({0, 0, 1});
     RC_ASSERT(J.has_value());
     for (const Vector3d& ray : many(genRayAt(
-             rc::gen::map(genReal(9, 320), [](double k) { return std::pow(10.0, -k); })))) {
-      // Beyond 1e-9 rad the second order shows in the tolerance for some admissible camera.
+             rc::gen::map(genReal(12, 320), [](double k) { return std::pow(10.0, -k); })))) {
+      // Beyond 1e-12 rad the second order shows in the tolerance for some admissible camera.
       const double angle = fieldAngle(ray);
       const auto pixel = camera.project(ray);
       RC_ASSERT(pixel.has_value());
@@ -639,7 +642,7 @@ TYPED_TEST(CameraSuite, TheImageOfAPlaneStaysOnItsArc) {
           }
           ++samples;
           chord.see(nearest / 0.01);
-          if (!(nearest <= 0.0105)) RC_FAIL("chord: " + describe(camera, *p));
+          if (!(nearest <= 0.01)) RC_FAIL("chord: " + describe(camera, *p));
         }
       }
     }
@@ -671,9 +674,17 @@ TYPED_TEST(CameraSuite, SpansAreThoseOfADenseSampling) {
         return t >= s.t0 - 1e-12 && t <= s.t1 + 1e-12;
       });
     };
-    const auto imaged = [&](double t) {
+    // Arcs along the border are inside and outside by rounding: 1e-9 px to either side decide
+    // nothing.
+    enum class Seen { kInside, kOutside, kBorderline };
+    const auto seenAt = [&](double t) {
       const auto pixel = camera.project(arc.at(t));
-      return pixel && camera.inImage(*pixel);
+      if (!pixel) return Seen::kOutside;
+      const double inner = std::min({pixel->x() + 0.5,
+                                     camera.width() - 0.5 - pixel->x(),
+                                     pixel->y() + 0.5,
+                                     camera.height() - 0.5 - pixel->y()});
+      return inner > 1e-9 ? Seen::kInside : inner < -1e-9 ? Seen::kOutside : Seen::kBorderline;
     };
     // Steps of 0.02 degrees; a run of wrong answers longer than 0.1 degrees is a missed piece or
     // gap.
@@ -681,7 +692,7 @@ TYPED_TEST(CameraSuite, SpansAreThoseOfADenseSampling) {
     int wrong = 0;
     for (int i = 0; i <= count; ++i) {
       const double t = static_cast<double>(i) / count;
-      wrong = imaged(t) == inSpan(t) ? 0 : wrong + 1;
+      wrong = seenAt(t) == (inSpan(t) ? Seen::kOutside : Seen::kInside) ? wrong + 1 : 0;
       if (wrong > 6) {
         std::ostringstream text;
         text << std::setprecision(17) << camera << " from " << arc.from.transpose() << " to "
@@ -691,10 +702,11 @@ TYPED_TEST(CameraSuite, SpansAreThoseOfADenseSampling) {
     }
     // Ends are where they are said to be.
     for (const ImageSpan& span : spans) {
-      RC_ASSERT(imaged(span.t0));
-      RC_ASSERT(imaged(span.t1));
-      if (span.end0 != ImageEnd::kArcEnd) RC_ASSERT(!imaged(span.t0 - 2e-13));
-      if (span.end1 != ImageEnd::kArcEnd) RC_ASSERT(!imaged(span.t1 + 2e-13));
+      RC_ASSERT(camera.inImage(camera.project(arc.at(span.t0)).value()));
+      RC_ASSERT(camera.inImage(camera.project(arc.at(span.t1)).value()));
+      const double step = 1e-12 + 4e-16 / arc.angle();
+      if (span.end0 != ImageEnd::kArcEnd) RC_ASSERT(seenAt(span.t0 - step) != Seen::kInside);
+      if (span.end1 != ImageEnd::kArcEnd) RC_ASSERT(seenAt(span.t1 + step) != Seen::kInside);
     }
   });
   EXPECT_GT(spans_seen, 60);
@@ -720,7 +732,7 @@ void agreesWithOpenCv(
     for (const Vector3d& ray : many(genRayFor(camera))) {
       if (!(fieldAngle(ray) < max_angle)) continue;
       const auto pixel = camera.project(ray);
-      if (!pixel || pixel->cwiseAbs().maxCoeff() > 1e5) continue;
+      if (!pixel || pixel->cwiseAbs().maxCoeff() > 1e4) continue;
       const double depth = 0.5 + static_cast<double>(points.size());
       points.emplace_back(depth * ray.x(), depth * ray.y(), depth * ray.z());
       ours.push_back(*pixel);

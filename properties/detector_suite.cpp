@@ -23,7 +23,8 @@ namespace {
 /// A number from RC_PARAMS ("seed=1 max_success=200").
 uint64_t rcParam(const std::string& key, uint64_t otherwise) {
   const char* env = std::getenv("RC_PARAMS");
-  const std::string params = env == nullptr ? "" : " " + std::string(env);
+  std::string params = " ";
+  if (env != nullptr) params += env;
   const size_t at = params.find(" " + key + "=");
   return at == std::string::npos ? otherwise : std::stoull(params.substr(at + key.size() + 2));
 }
@@ -52,10 +53,10 @@ std::ostream& operator<<(std::ostream& out, const Pool& pool) {
              << pool.qualified << "/" << pool.eligible << " of contrast and length are clear";
 }
 
-// Noise-free, linear encoding, optical blur 0.7 px: labels of >= 30 grey levels and >= max(5 deg, 40 px)
-// that are >= 12 px from other edges are found at rho = 4 px. Pooled recall >= 97 %, over all models
-// and each; at least 30 % of the labels of that contrast and length must be clear, or the property
-// would be about the easy few.
+// Noise-free, linear encoding, optical blur 0.7 px: labels of >= 30 grey levels and >= max(5 deg,
+// 40 px) that are >= 12 px from other edges are found at rho = 4 px. Pooled recall >= 97 %, over
+// all models and each; at least 30 % of the labels of that contrast and length must be clear, or
+// the property would be about the easy few.
 TEST(DetectorSuite, ClearLabelsAreFound) {
   const uint64_t seed = rcParam("seed", 1);
   const uint64_t frames = std::max<uint64_t>(4, rcParam("max_success", 100) / 20);
@@ -66,7 +67,7 @@ TEST(DetectorSuite, ClearLabelsAreFound) {
     for (uint64_t i = 0; i < frames; ++i) {
       FrameCase frame_case{.property = "recovery",
                            .camera = drawCamera(Model::kName, seed * 1000003 + i),
-                           .scene = i % 4 == 3 ? "paper" : "room",
+                           .scene = i % 2 == 1 ? "paper" : "room",
                            .seed = seed,
                            .index = i,
                            .sensor = {},
@@ -104,7 +105,8 @@ TEST(Counterexamples, EachIsFixed) {
     ASSERT_EQ(frame_case.property, "recovery") << path;
     const RecoveryOutcome outcome = checkRecovery(frame_case, renderCase(frame_case), {});
     EXPECT_GT(outcome.qualified, 0) << path;
-    EXPECT_TRUE(outcome.missed_ids.empty()) << path << ": " << outcome.missed_ids.size() << " missed";
+    EXPECT_TRUE(outcome.missed_ids.empty())
+        << path << ": " << outcome.missed_ids.size() << " missed";
     ++replayed;
   }
   std::cout << replayed << " counterexamples replayed\n";
@@ -112,18 +114,20 @@ TEST(Counterexamples, EachIsFixed) {
 
 TEST(FrameCase, RoundTripsThroughJson) {
   rc::check([] {
-    const FrameCase frame_case{.property = "recovery",
-                               .camera = *genAnyCamera(Range::kAdmissible),
-                               .scene = "paper",
-                               .seed = *rc::gen::arbitrary<uint64_t>(),
-                               .index = *rc::gen::arbitrary<uint64_t>(),
-                               .sensor = {.psf_sigma_px = *genReal(0, 20), .encoding = Encoding::kGamma},
-                               .detector = "dlsd-paper"};
+    const FrameCase frame_case{
+        .property = "recovery",
+        .camera = *genAnyCamera(Range::kAdmissible),
+        .scene = "paper",
+        .seed = *rc::gen::arbitrary<uint64_t>(),
+        .index = *rc::gen::arbitrary<uint64_t>(),
+        .sensor = {.psf_sigma_px = *genReal(0, 20), .encoding = Encoding::kGamma},
+        .detector = "dlsd-paper"};
     const auto json = toJson(frame_case);
     const FrameCase back = frameCaseFromJson(parseJson(json.dump(), "case"), "case");
     RC_ASSERT(toJson(back) == json);
     RC_ASSERT(back.camera == frame_case.camera);
-  }) || (ADD_FAILURE(), true);
+  }) ||
+      (ADD_FAILURE(), true);
 }
 
 }  // namespace
