@@ -37,7 +37,6 @@ Table addScene(uint64_t seed, SceneBuilder* builder) {
   table.lo = {room.x() / 2 - width / 2, room.y() / 2 - depth / 2, height - 0.03};
   table.hi = {room.x() / 2 + width / 2, room.y() / 2 + depth / 2, height};
   const Frame3 world;
-  builder->nextObject();
   const Surface wood = dark();
   const SlabFaces board = builder->addBox(world, table.lo, table.hi, wood);
   for (const double x : {table.lo.x() + 0.03, table.hi.x() - 0.09}) {
@@ -64,7 +63,6 @@ Table addScene(uint64_t seed, SceneBuilder* builder) {
 
   // Faint clutter near the table's ends.
   const auto clutter = [&](double x0, double x1, double y0, double y1, double h) {
-    builder->nextObject();
     const Surface s{wood.albedo * random.next(1.1, 1.7), 0};
     builder->addBox(world,
                     {table.lo.x() + x0, table.lo.y() + y0, height},
@@ -76,7 +74,6 @@ Table addScene(uint64_t seed, SceneBuilder* builder) {
   clutter(width - 0.32, width - 0.06, depth - 0.25, depth - 0.08, random.next(0.02, 0.06));
   // And around it.
   for (int k = 0; k < 4; ++k) {
-    builder->nextObject();
     const double w = random.next(0.5, 1.2), h = random.next(0.5, 1.9);
     const double x = k % 2 == 0 ? 0.1 : room.x() - w - 0.1;
     const double y = k / 2 == 0 ? 0.1 : room.y() - 0.5;
@@ -132,7 +129,7 @@ SceneView makePaper(uint64_t seed, uint64_t index) {
 
   // The image's level is that of the circle around the table, also straight above it.
   SceneView view;
-  view.pose.position_in_world = (aim + distance * offset).cast<float>().cast<double>();
+  view.pose.position_in_world = roundToFloat(aim + distance * offset);
   const Vector3d x(std::cos(around), std::sin(around), 0);
   const Vector3d z = -offset;
   Eigen::Matrix3d level;

@@ -58,6 +58,7 @@ class RoomMaker {
   static constexpr uint64_t kStream = 0x700b;
   static constexpr double kMargin = 0.02;  ///< Between the boxes that things reserve.
   static constexpr double kWallGap = 0.04;
+  static constexpr double kTopThings = 0.6;  ///< Height kept for things on a table or cabinet.
 
   [[nodiscard]] double wallWidth(int wall) const { return wall % 2 == 0 ? size_.x() : size_.y(); }
 
@@ -212,7 +213,6 @@ class RoomMaker {
   }
 
   void addBlind(const Frame3& wall, const Pocket& niche) {
-    builder_.nextObject();
     const Surface slat = paint(0.4, 0.85);
     const double step = random_.next(0.035, 0.06), height = step * random_.next(0.4, 0.7);
     const double drop = (niche.y1 - niche.y0) * random_.next(0.2, 0.75);
@@ -246,7 +246,6 @@ class RoomMaker {
                                near(front.surface, 0.1),
                                plain(near(front.surface, 0.15))});
     }
-    builder_.nextObject();
     builder_.addSlab(f, width, height, depth, front, front.surface);
     taken_.push_back(box);
   }
@@ -284,7 +283,6 @@ class RoomMaker {
     front.pockets.push_back(leaf);
     Frame3 f = frame;
     f.origin = frame.at(door_lo_, 0, proud);
-    builder_.nextObject();
     builder_.addSlab(f, width, height, proud, front, front.surface, true);
     // The handle, on the rail beside the panels.
     Frame3 handle = frame;
@@ -301,7 +299,6 @@ class RoomMaker {
       if (x1 - x0 < 0.05) return;
       Frame3 f = SceneBuilder::wallFrame(size_, wall);
       f.origin = f.at(x0, 0, thick);
-      builder_.nextObject();
       builder_.addSlab(f, x1 - x0, height, thick, plain(surface), surface, true);
     };
     for (int k = 0; k < 4; ++k) {
@@ -392,7 +389,6 @@ class RoomMaker {
           (box.lo.array() >= room_lo.array()).all() && (box.hi.array() <= room_hi.array()).all();
       if (!inside || !isFree(box)) continue;
       taken_.push_back(box);
-      builder_.nextObject();
       return f;
     }
     return std::nullopt;
@@ -493,7 +489,6 @@ class RoomMaker {
     }
     builder_.addBox(*f, {0, 0, 0}, size, front, wood);
     for (const Pocket& p : front.pockets) {
-      builder_.nextObject();
       const double what = random_.next(0, 1);
       if (what < 0.45) {
         addBooks(
@@ -512,7 +507,8 @@ class RoomMaker {
 
   void addCabinet() {
     const Vector3d size{random_.next(0.5, 1.4), random_.next(0.38, 0.55), random_.next(0.6, 1.9)};
-    const auto f = place(size, 1);
+    const bool room_on_top = size.z() + kTopThings < size_.z();
+    const auto f = place(size + Vector3d(0, 0, room_on_top ? kTopThings : 0), 1);
     if (!f) return;
     const Surface body = paint(0.15, 0.85);
     const bool drawers = random_.nextBool(0.5);
@@ -539,12 +535,11 @@ class RoomMaker {
       const double z = drawers ? p.y0 + (p.y1 - p.y0) * 0.6 : (p.y0 + p.y1 - hh) / 2;
       builder_.addBox(*f, {x, -0.022, z}, {x + hw, depth, z + hh}, metal);
     }
-    addTopThings(*f, size);
+    if (room_on_top) addTopThings(*f, size);
   }
 
   /// Things that stand on a flat top: [0, size.x] x [0, size.y] at z = size.z.
   void addTopThings(const Frame3& f, const Vector3d& size) {
-    builder_.nextObject();
     double x = random_.next(0.03, 0.2);
     const double y_max = size.y() - 0.02;
     while (true) {
@@ -621,8 +616,7 @@ class RoomMaker {
 
   void addTable() {
     const Vector3d size{random_.next(0.9, 1.8), random_.next(0.6, 0.95), random_.next(0.7, 0.76)};
-    // The top's things stand up to 0.6 m high.
-    const auto f = place({size.x(), size.y(), size.z() + 0.6}, 0.5);
+    const auto f = place({size.x(), size.y(), size.z() + kTopThings}, 0.5);
     if (!f) return;
     const Surface wood = paint(0.12, 0.75);
     const double top = random_.next(0.02, 0.045);
@@ -718,7 +712,7 @@ class RoomMaker {
     for (int k = 0; k < 4; ++k) {
       const double a = M_PI / 4 + k * M_PI / 2;
       const Vector3d dir(std::cos(a), std::sin(a), 0);
-      builder_.addRod(f->at(r + 0.9 * r * dir.x(), r + 0.9 * r * dir.y(), 0.001),
+      builder_.addRod(f->at(r + 0.9 * r * dir.x(), r + 0.9 * r * dir.y(), 0.006),
                       f->at(r + 0.6 * r * dir.x(), r + 0.6 * r * dir.y(), height - 0.012),
                       0.011,
                       8,
@@ -751,7 +745,7 @@ class RoomMaker {
     if (!f) return;
     const double radius = random_.next(0.0015, 0.005);
     const Surface metal = random_.nextBool(0.5) ? paint(0.03, 0.15) : paint(0.5, 0.9);
-    const double ball = 2.8 * radius;
+    const double ball = 4.2 * radius;  // No ball is larger.
     std::vector<Vector3d> nodes;
     const auto node = [&](double x, double y, double z) {
       // Nodes stay inside the reserved box and on the floor.
@@ -793,11 +787,44 @@ class RoomMaker {
         links.push_back({at, static_cast<size_t>((k + 1) % corners + 2)});
       }
     }
-    for (const Vector3d& n : nodes) builder_.addSphere(n, ball, metal);
-    for (const auto& [a, b] : links) {
+    addJointedRods(nodes, links, radius, metal);
+  }
+
+  /// Rods along the links; each node's rods end where they would enter each other, under a ball.
+  void addJointedRods(const std::vector<Vector3d>& nodes,
+                      std::vector<std::array<size_t, 2>> links,
+                      double radius,
+                      const Surface& surface) {
+    constexpr double kLeastAngle = 0.55;
+    const auto direction = [&](const std::array<size_t, 2>& link, size_t from) -> Vector3d {
+      const size_t to = link[0] == from ? link[1] : link[0];
+      return (nodes[to] - nodes[from]).normalized();
+    };
+    // Least angle at each node; a link that makes too sharp a corner is left out.
+    std::vector<double> least(nodes.size(), M_PI);
+    std::vector<std::array<size_t, 2>> kept;
+    for (const auto& link : links) {
+      std::array<double, 2> angle{M_PI, M_PI};
+      for (const auto& other : kept) {
+        for (size_t k = 0; k < 2; ++k) {
+          if (other[0] != link[k] && other[1] != link[k]) continue;
+          const double cosine = direction(link, link[k]).dot(direction(other, link[k]));
+          angle[k] = std::min(angle[k], std::acos(std::clamp(cosine, -1.0, 1.0)));
+        }
+      }
+      if (std::min(angle[0], angle[1]) < kLeastAngle) continue;
+      kept.push_back(link);
+      for (size_t k = 0; k < 2; ++k) least[link[k]] = std::min(least[link[k]], angle[k]);
+    }
+    const auto offset = [&](size_t node) {
+      return radius * std::max(2.0, 1.05 / std::tan(least[node] / 2));
+    };
+    for (size_t n = 0; n < nodes.size(); ++n) {
+      builder_.addSphere(nodes[n], std::hypot(offset(n), radius) + 0.2 * radius, surface);
+    }
+    for (const auto& [a, b] : kept) {
       const Vector3d d = (nodes[b] - nodes[a]).normalized();
-      builder_.nextObject();
-      builder_.addRod(nodes[a] + 2.4 * radius * d, nodes[b] - 2.4 * radius * d, radius, 4, metal);
+      builder_.addRod(nodes[a] + offset(a) * d, nodes[b] - offset(b) * d, radius, 4, surface);
     }
   }
 
@@ -831,7 +858,6 @@ class RoomMaker {
       const Box3 box = boxIn(frame, {x, y, 0}, {x + w, y + h, depth});
       if (!isFree(box)) continue;
       taken_.push_back(box);
-      builder_.nextObject();
       return Vector2d(x, y);
     }
     return std::nullopt;
@@ -919,7 +945,6 @@ class RoomMaker {
     shelf.axes << f.axes.col(0), -f.axes.col(2), f.axes.col(1);
     const Surface wood = anyPaint();
     builder_.addBox(shelf, {0, 0, 0}, {w, depth, thick}, wood);
-    builder_.nextObject();
     addBooks(shelf, 0.02, w * random_.next(0.4, 0.97), 0.015, depth - 0.04, thick, above - 0.04);
   }
 
@@ -945,7 +970,6 @@ class RoomMaker {
       const Box3 box{ball.array() - r, Vector3d(ball.x() + r, ball.y() + r, size_.z())};
       if (!isFree(box)) return;
       taken_.push_back(box);
-      builder_.nextObject();
       builder_.addRod({centre.x(), centre.y(), ball.z() + r * 0.9},
                       {centre.x(), centre.y(), size_.z()},
                       0.005,

@@ -15,9 +15,15 @@ Eigen::Matrix4d Pose::matrix() const {
   return m;
 }
 
+Eigen::Vector3d roundToFloat(const Eigen::Vector3d& p) {
+  // Through a variable: Eigen 3.4 evaluates a chain of two casts of an expression without rounding.
+  const Eigen::Vector3f rounded = p.cast<float>();
+  return rounded.cast<double>();
+}
+
 Pose lookAt(const Eigen::Vector3d& position, const Eigen::Vector3d& target, double roll_rad) {
   Pose pose;
-  pose.position_in_world = position.cast<float>().cast<double>();
+  pose.position_in_world = roundToFloat(position);
   const Eigen::Vector3d z = (target - pose.position_in_world).normalized();
   Eigen::Vector3d x = z.cross(Eigen::Vector3d::UnitZ());
   // Straight up or down there is no level; any x will do.

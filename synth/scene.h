@@ -105,7 +105,7 @@ struct SolidPiece {
   Eigen::Vector3d centre;
   Eigen::Matrix3d axes;  ///< Columns: unit axes.
   Eigen::Vector3d half;
-  int object;  ///< Pieces of one object may touch and overlap.
+  int solid;  ///< Pieces of one solid share it.
 };
 
 struct Scene {
@@ -133,6 +133,9 @@ struct Pose {
   }
   [[nodiscard]] Eigen::Matrix4d matrix() const;
 };
+
+/// The nearest point whose coordinates are floats.
+[[nodiscard]] Eigen::Vector3d roundToFloat(const Eigen::Vector3d& p);
 
 /// Pose at a position (rounded to float) that looks at a target, turned about the view direction by
 /// roll_rad; at 0 the image's down is the world's down.

@@ -163,7 +163,7 @@ void SceneBuilder::addPieces(const Frame3& frame,
           {frame.at(x, y, (z_front + z_back) / 2),
            frame.axes,
            {(xs[i + 1] - xs[i]) / 2, (ys[j + 1] - ys[j]) / 2, (z_front - z_back) / 2},
-           object_});
+           solid_});
     }
   }
   for (const Pocket& p : panel.pockets) {
@@ -200,6 +200,7 @@ SlabFaces SceneBuilder::addSlab(const Frame3& frame,
     addEdge(f[next], b[next], side[k], side[next]);
   }
   addPieces(frame, 0, width, 0, height, 0, -depth, front);
+  ++solid_;
   return faces;
 }
 
@@ -267,7 +268,7 @@ void SceneBuilder::addRod(const Eigen::Vector3d& from,
   const double half = radius * std::cos(M_PI / sides);
   Eigen::Matrix3d axes;
   axes << x, y, axis;
-  scene.pieces.push_back({(from + to) / 2, axes, {half, half, (to - from).norm() / 2}, object_});
+  scene.pieces.push_back({(from + to) / 2, axes, {half, half, (to - from).norm() / 2}, solid_++});
 }
 
 void SceneBuilder::addSphere(const Eigen::Vector3d& centre, double radius, const Surface& surface) {
@@ -332,7 +333,7 @@ std::array<PanelFaces, 6> SceneBuilder::addRoom(const Eigen::Vector3d& size,
     double deepest = 0.1;
     for (const Pocket& p : walls[i].pockets) deepest = std::max(deepest, 2 * p.depth + 0.1);
     addPieces(wallFrame(size, k), 0, width(k), 0, size.z(), 0, -deepest, walls[i]);
-    nextObject();
+    ++solid_;
   }
   const auto corners = [&](double z) -> Corners {
     return {addVertex({0, 0, z}),
@@ -355,8 +356,7 @@ std::array<PanelFaces, 6> SceneBuilder::addRoom(const Eigen::Vector3d& size,
     scene.pieces.push_back({{size.x() / 2, size.y() / 2, z},
                             Eigen::Matrix3d::Identity(),
                             {size.x() / 2, size.y() / 2, 0.05},
-                            object_});
-    nextObject();
+                            solid_++});
   }
   return faces;
 }

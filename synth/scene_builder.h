@@ -105,9 +105,6 @@ class SceneBuilder {
   /// The frame of such a wall: origin bottom left as seen from inside, z into the room.
   [[nodiscard]] static Frame3 wallFrame(const Eigen::Vector3d& size, int wall);
 
-  /// Everything added from here on belongs to one object more.
-  void nextObject() { ++object_; }
-
   Scene scene;
 
   /// Numbers the carriers. Call once, last.
@@ -129,7 +126,7 @@ class SceneBuilder {
                  double z_back,
                  const Panel& panel);
 
-  int object_ = 0;
+  int solid_ = 0;
 };
 
 }  // namespace dlsd
