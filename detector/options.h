@@ -13,8 +13,8 @@ struct EdgeDrawingOptions {
   double min_gradient = 1.25;  ///< Chains end below. In [0, anchor_gradient].
   /// The same two in units of the gradient's noise (standard deviation of one component), which is
   /// measured in each image; the larger bound holds. In [0, 100]; 0 switches the measurement off.
-  double anchor_noise_ratio = 3;
-  double min_noise_ratio = 1.8;
+  double anchor_noise_ratio = 4;
+  double min_noise_ratio = 2.2;
   int anchor_interval_px = 2;  ///< Rows and columns on which anchors are looked for. In [1, 64].
   int min_chain_px = 10;       ///< Shorter chains are dropped. In [2, 1000].
   bool subpixel = true;  ///< Move chain pixels to the crest of the gradient along its direction.
