@@ -15,7 +15,7 @@ cmake --build --preset release --target dlsd_cli | tail -n 1
 dlsd=build/release/cli/dlsd
 
 cameras=()
-for name in pinhole_90 tum_mono_wide tum_vi_cam0 omni_catadioptric; do
+for name in pinhole_90 tum_mono_wide tum_vi_cam0 catadioptric; do
   cameras+=(--camera "fixtures/calibrations/$name.yaml")
 done
 mkdir -p "$out"

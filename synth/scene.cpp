@@ -16,7 +16,8 @@ Eigen::Matrix4d Pose::matrix() const {
 }
 
 Eigen::Vector3d roundToFloat(const Eigen::Vector3d& p) {
-  // Through a variable: Eigen 3.4 evaluates a chain of two casts of an expression without rounding.
+  // Through a variable: GCC 12 at -O3 leaves the rounding out of x.cast<float>().cast<double>()
+  // where x is an Eigen expression.
   const Eigen::Vector3f rounded = p.cast<float>();
   return rounded.cast<double>();
 }
@@ -38,21 +39,47 @@ Pose lookAt(const Eigen::Vector3d& position, const Eigen::Vector3d& target, doub
   return pose;
 }
 
+namespace {
+
+struct Preset {
+  std::string_view version;  ///< "name/number".
+  SceneView (*make)(uint64_t seed, uint64_t index);
+  [[nodiscard]] std::string_view name() const { return version.substr(0, version.find('/')); }
+};
+
+constexpr Preset kPresets[] = {
+    {kRoomVersion, makeRoom},
+    {kPaperVersion, makePaper},
+    {kPolyhedraVersion, makePolyhedra},
+};
+
+const Preset& presetByName(std::string_view name) {
+  std::string allowed;
+  for (const Preset& preset : kPresets) {
+    if (preset.name() == name) return preset;
+    allowed += (allowed.empty() ? "" : ", ") + std::string(preset.name());
+  }
+  throw std::invalid_argument("scene = \"" + std::string(name) + "\" is unknown: allowed are " +
+                              allowed);
+}
+
+}  // namespace
+
 const std::vector<std::string>& scenePresets() {
-  static const std::vector<std::string> names{"room", "paper"};
+  static const std::vector<std::string> names = [] {
+    std::vector<std::string> list;
+    for (const Preset& preset : kPresets) list.emplace_back(preset.name());
+    return list;
+  }();
   return names;
 }
 
 std::string presetVersion(std::string_view preset) {
-  if (preset == "room") return std::string(kRoomVersion);
-  if (preset == "paper") return std::string(kPaperVersion);
-  throw std::invalid_argument("scene = \"" + std::string(preset) +
-                              "\" is unknown: allowed are room, paper");
+  return std::string(presetByName(preset).version);
 }
 
 SceneView makeSceneView(std::string_view preset, uint64_t seed, uint64_t index) {
-  if (presetVersion(preset) == kRoomVersion) return makeRoom(seed, index);
-  return makePaper(seed, index);
+  return presetByName(preset).make(seed, index);
 }
 
 }  // namespace dlsd

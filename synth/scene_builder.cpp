@@ -222,6 +222,34 @@ SlabFaces SceneBuilder::addBox(const Frame3& frame,
   return addBox(frame, lo, hi, Panel{surface, {}}, surface);
 }
 
+void SceneBuilder::addSolid(const std::vector<Eigen::Vector3d>& vertices,
+                            const std::vector<std::vector<int>>& loops,
+                            const std::vector<Surface>& surfaces) {
+  Eigen::Vector3d lo = vertices.front(), hi = lo;
+  std::vector<int> index;
+  for (const Eigen::Vector3d& v : vertices) {
+    index.push_back(addVertex(v));
+    lo = lo.cwiseMin(v);
+    hi = hi.cwiseMax(v);
+  }
+  std::map<std::pair<int, int>, int> first_face;  // Of an edge, by its vertices in ascending order.
+  for (size_t k = 0; k < loops.size(); ++k) {
+    std::vector<int> loop;
+    for (const int v : loops[k]) loop.push_back(index[static_cast<size_t>(v)]);
+    const size_t n = loop.size();
+    const int face = startFace(surfaces[k], {loop[0], loop[1], loop[n / 2], loop[n - 1]});
+    for (size_t i = 1; i + 1 < n; ++i) {
+      scene.triangles.push_back({{loop[0], loop[i], loop[i + 1]}, face});
+    }
+    for (size_t i = 0; i < n; ++i) {
+      const int a = loop[i], b = loop[(i + 1) % n];
+      const auto [it, is_first] = first_face.try_emplace(std::minmax(a, b), face);
+      if (!is_first) addEdge(it->first.first, it->first.second, it->second, face);
+    }
+  }
+  scene.pieces.push_back({(lo + hi) / 2, Eigen::Matrix3d::Identity(), (hi - lo) / 2, solid_++});
+}
+
 void SceneBuilder::addRod(const Eigen::Vector3d& from,
                           const Eigen::Vector3d& to,
                           double radius,

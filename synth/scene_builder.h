@@ -81,6 +81,12 @@ class SceneBuilder {
                    const Panel& front,
                    const Surface& sides);
 
+  /// A solid bounded by planar polygons. Each loop lists vertices counter-clockwise as seen from
+  /// outside, starting with one from which the whole polygon is seen; each edge is in two loops.
+  void addSolid(const std::vector<Eigen::Vector3d>& vertices,
+                const std::vector<std::vector<int>>& loops,
+                const std::vector<Surface>& surfaces);
+
   /// A prism with 4 or 8 sides.
   void addRod(const Eigen::Vector3d& from,
               const Eigen::Vector3d& to,

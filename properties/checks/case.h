@@ -11,15 +11,15 @@
 
 namespace dlsd {
 
-/// What a property is checked on: a frame, made again bit for bit from these values, and the options
-/// of the detector by name.
+/// What a property is checked on: a frame, made again bit for bit from these values, and the
+/// options of the detector by name.
 struct FrameCase {
-  std::string property;             ///< Which predicate judges it, e.g. "recovery".
+  std::string property;  ///< Which predicate judges it, e.g. "recovery".
   Camera camera;
-  std::string scene = "room";       ///< Preset.
+  std::string scene = "room";  ///< Preset.
   uint64_t seed = 0, index = 0;
   SensorOptions sensor;
-  std::string detector = "dlsd";     ///< One of builtinDetectors().
+  std::string detector = "dlsd";  ///< One of builtinDetectors().
 };
 
 [[nodiscard]] nlohmann::ordered_json toJson(const FrameCase& frame_case);

@@ -15,7 +15,8 @@ std::string svgCurve(const std::vector<Eigen::Vector2d>& points, const char* sty
   text += style;
   text += " points='";
   // SVG's origin is the corner of the first pixel, ours its centre.
-  for (const Eigen::Vector2d& p : points) text += fmt::format("{:.2f},{:.2f} ", p.x() + 0.5, p.y() + 0.5);
+  for (const Eigen::Vector2d& p : points)
+    text += fmt::format("{:.2f},{:.2f} ", p.x() + 0.5, p.y() + 0.5);
   text += "'/>\n";
   return text;
 }
@@ -25,7 +26,12 @@ std::string overlaySvg(const Frame& frame, const RecoveryOutcome& outcome) {
   std::string svg = fmt::format(
       "<svg xmlns='http://www.w3.org/2000/svg' width='{}' height='{}' viewBox='0 0 {} {}'>\n"
       "<image href='image.png' width='{}' height='{}' style='image-rendering:pixelated'/>\n",
-      w, h, w, h, w, h);
+      w,
+      h,
+      w,
+      h,
+      w,
+      h);
   for (const LabelLine& label : frame.labels.lines) {
     svg += svgCurve(label.points, "stroke='#4af' stroke-width='0.5'");
   }

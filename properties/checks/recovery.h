@@ -11,8 +11,8 @@
 namespace dlsd {
 
 /// Which labels must be found, and how closely. A label *qualifies* if it has the contrast and the
-/// length and no other label comes nearer than clearance_px (around a shared vertex, the labels that
-/// meet there do not count; evaluation/evaluate.h, kSharedEndRadiusPx).
+/// length and no other label comes nearer than clearance_px (around a shared vertex, the labels
+/// that meet there do not count; evaluation/evaluate.h, kSharedEndRadiusPx).
 struct RecoveryCriteria {
   double min_contrast = 30;  ///< 8-bit grey levels.
   double min_angle_rad = 5 * M_PI / 180;
