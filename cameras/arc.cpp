@@ -203,6 +203,7 @@ std::optional<Arc> arcBetween(const Eigen::Vector3d& from, const Eigen::Vector3d
 std::optional<Arc> arcOnPlane(const Eigen::Vector3d& normal,
                               const Eigen::Vector3d& from,
                               const Eigen::Vector3d& to) {
+  if (!(normal.norm() > 0)) return std::nullopt;
   const Eigen::Vector3d n = normal.normalized();
   const Eigen::Vector3d a = from - n * n.dot(from), b = to - n * n.dot(to);
   if (!(a.norm() > 1e-12 * from.norm()) || !(b.norm() > 1e-12 * to.norm())) return std::nullopt;

@@ -31,7 +31,7 @@ struct Arc {
 [[nodiscard]] std::optional<Arc> arcBetween(const Eigen::Vector3d& from, const Eigen::Vector3d& to);
 
 /// Arc with a given plane (a fitted one): the ends are the rays projected onto the plane.
-/// No value if a ray is (anti)parallel to the normal.
+/// No value if a ray is (anti)parallel to the normal, or the normal is zero.
 [[nodiscard]] std::optional<Arc> arcOnPlane(const Eigen::Vector3d& normal,
                                             const Eigen::Vector3d& from,
                                             const Eigen::Vector3d& to);
