@@ -487,7 +487,9 @@ Labels makeLabels(const Scene& scene,
     } else if (edge.source == EdgeSource::kDecal) {
       line.kind = LineKind::kMaterial;
     } else {
-      line.kind = 2 * continuous > kContrastPoints ? LineKind::kCrease : LineKind::kSilhouette;
+      const bool both = view.looksAtCamera(edge.face0) && view.looksAtCamera(edge.face1);
+      line.kind =
+          both || 2 * continuous > kContrastPoints ? LineKind::kCrease : LineKind::kSilhouette;
     }
     if (line.ends[0] == EndKind::kVertex) {
       vertex_ends.push_back({edge.from, line.points.front(), line.id});

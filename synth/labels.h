@@ -54,9 +54,9 @@ struct Labels {
 /// the centre line is in the image, the rod is labelled by its prism edges, else by its centre
 /// line.
 ///
-/// Kind: decal borders are `material`, centre lines `wire`. An edge of two faces is `crease` where
-/// both sides of it in the image show faces that contain it (both its own faces, or one of them and
-/// the surface on which the solid stands), else `silhouette`.
+/// Kind: decal borders are `material`, centre lines `wire`. An edge of two faces is `crease` if
+/// both look at the camera, or where both sides of it in the image show faces that contain it (its
+/// own and the surface on which the solid stands), else `silhouette`.
 ///
 /// Contrast: |difference| of grey levels before noise and blur, after exposure and encoding,
 /// between rays 2e-4 rad to both sides, at 11 points spread evenly over the span. For wires:

@@ -166,11 +166,32 @@ void castCorners(const CameraRays& rays, int j, RayGun* gun, CornerRow* row) {
   flush();
 }
 
+/// Sample k of the lattice comes as number m, so that any first few are spread over the pixel.
+constexpr std::array<int, kFineSamples> bitReversedOrder() {
+  std::array<int, kFineSamples> order{};
+  for (int m = 0; m < kFineSamples; ++m) {
+    int k = 0;
+    for (int bit = 1, rest = m; bit < kFineSamples; bit *= 2, rest /= 2) k = 2 * k + rest % 2;
+    order[static_cast<size_t>(m)] = k;
+  }
+  return order;
+}
+
+/// Radiance of one surface within a pixel: shaded at its first `limit` samples, counted at all.
+struct SurfaceShare {
+  int surface;
+  int samples, shaded;
+  double sum;
+  [[nodiscard]] double mean() const { return sum / shaded; }
+};
+
 /// Mean over the pixel's square of kFineSamples samples.
-float finePixel(const CameraRays& rays, int i, int j, uint64_t shift_bits, RayGun* gun) {
+float finePixel(
+    const CameraRays& rays, int i, int j, uint64_t shift_bits, int shade_limit, RayGun* gun) {
   // Rank-1 lattice: both projections hit each of the 64 strata once, so edges along the axes are as
   // fine as 1/64 px, and 19 keeps the points apart in between (the best generator for 64).
   constexpr int kGenerator = 19;
+  static constexpr std::array<int, kFineSamples> kOrder = bitReversedOrder();
   const double shift_u = static_cast<double>(shift_bits >> 40) * 0x1p-24;
   const double shift_v = static_cast<double>((shift_bits >> 8) & 0xffffffU) * 0x1p-24;
   const bool exact = rays.isExact(i, j);
@@ -181,17 +202,12 @@ float finePixel(const CameraRays& rays, int i, int j, uint64_t shift_bits, RayGu
                rays.cornerRay(i, j + 1),
                rays.cornerRay(i + 1, j + 1)};
   }
-  // Radiance of the flat surfaces met so far in this pixel.
-  struct Known {
-    int surface;
-    float radiance;
-  };
-  std::array<Known, 8> known{};
-  size_t known_count = 0;
-  double sum = 0;
+  std::array<SurfaceShare, kFineSamples> shares;
+  size_t share_count = 0;
   int samples = 0;
   gun->clear();
-  for (int k = 0; k < kFineSamples; ++k) {
+  for (int m = 0; m < kFineSamples; ++m) {
+    const int k = kOrder[static_cast<size_t>(m)];
     double u = (k + 0.5) / kFineSamples + shift_u;
     double v = ((k * kGenerator) % kFineSamples + 0.5) / kFineSamples + shift_v;
     u -= std::floor(u);
@@ -204,27 +220,27 @@ float finePixel(const CameraRays& rays, int i, int j, uint64_t shift_bits, RayGu
       gun->add((1 - b) * ((1 - a) * corners[0] + a * corners[1]) +
                b * ((1 - a) * corners[2] + a * corners[3]));
     }
-    if (!gun->full() && k + 1 < kFineSamples) continue;
+    if (!gun->full() && m + 1 < kFineSamples) continue;
     gun->fire();
     for (size_t s = 0; s < gun->count(); ++s) {
       const int surface = gun->surface(s);
-      const auto end = known.begin() + static_cast<ptrdiff_t>(known_count);
-      const auto it =
-          std::find_if(known.begin(), end, [&](const Known& x) { return x.surface == surface; });
-      float radiance = 0;
-      if (it != end) {
-        radiance = it->radiance;
-      } else {
-        radiance = gun->radiance(s, surface);
-        if (gun->isFlat(s) && known_count < known.size())
-          known[known_count++] = {surface, radiance};
+      size_t at = 0;
+      while (at < share_count && shares[at].surface != surface) ++at;
+      if (at == share_count) shares[share_count++] = {surface, 0, 0, 0};
+      SurfaceShare& share = shares[at];
+      ++share.samples;
+      if (share.shaded < shade_limit || !gun->isFlat(s)) {
+        share.sum += static_cast<double>(gun->radiance(s, surface));
+        ++share.shaded;
       }
-      sum += static_cast<double>(radiance);
     }
     samples += static_cast<int>(gun->count());
     gun->clear();
   }
-  return samples > 0 ? static_cast<float>(sum / samples) : 0.0F;
+  if (samples == 0) return 0;
+  double sum = 0;
+  for (size_t k = 0; k < share_count; ++k) sum += shares[k].samples * shares[k].mean();
+  return static_cast<float>(sum / samples);
 }
 
 }  // namespace
@@ -294,6 +310,8 @@ Rendering renderRadiance(const Scene& scene,
     for (const EdgeSpan& span : spans) mask.markCurve(span.curve);
     markSmallRounds(scene, rays.camera(), pose, &mask);
   }
+  // Shading varies slowly within a pixel: four spread samples of a surface speak for all of them.
+  const int shade_limit = sampling == Sampling::kAdaptive ? 4 : kFineSamples;
   Rendering rendering;
   rendering.radiance.resize(static_cast<size_t>(width) * static_cast<size_t>(height));
   RayGun gun(raycaster, shader, pose);
@@ -309,7 +327,7 @@ Rendering renderRadiance(const Scene& scene,
           s == above.surface[c + 1] && s == below.surface[c] && s == below.surface[c + 1];
       float& out = rendering.radiance[pixel];
       if (sampling == Sampling::kEverywhere || !one_surface || mask.marked(pixel)) {
-        out = finePixel(rays, i, j, hashCounters({key, pixel}), &gun);
+        out = finePixel(rays, i, j, hashCounters({key, pixel}), shade_limit, &gun);
         ++rendering.fine_pixels;
       } else {
         out = (above.radiance[c] + above.radiance[c + 1] + below.radiance[c] +

@@ -20,7 +20,7 @@ namespace dlsd {
 class CameraRays {
  public:
   /// px; the label tolerance is 1e-3.
-  static constexpr double kMaxErrPx = 3e-4;
+  static constexpr double kMaxErrPx = 6e-4;
 
   explicit CameraRays(const Camera& camera);
 
@@ -66,9 +66,9 @@ struct Rendering {
 
 /// Box-filtered radiance. A pixel whose four corners see one surface, and through which no span's
 /// curve passes, gets the mean of its corners; all others kFineSamples samples in a rank-1 lattice,
-/// shifted by a hash of (key, pixel). So no visible edge or thin rod is missed, and curved outlines
-/// are found by the corners. Samples without a ray are left out of the mean; a pixel without any is
-/// 0.
+/// shifted by a hash of (key, pixel); the first four of each flat surface are shaded. So no visible
+/// edge or thin rod is missed, and curved outlines are found by the corners. Samples without a ray
+/// are left out of the mean; a pixel without any is 0.
 [[nodiscard]] Rendering renderRadiance(const Scene& scene,
                                        const Raycaster& raycaster,
                                        const Shader& shader,

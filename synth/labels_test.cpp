@@ -1,0 +1,379 @@
+#include "synth/labels.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <limits>
+
+#include "synth/random.h"
+#include "synth/render.h"
+#include "synth/scene_builder.h"
+#include "synth/test_cameras.h"
+
+namespace dlsd {
+namespace {
+
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+
+/// Is the point of the edge hidden? Every triangle, sphere and disc is intersected in double;
+/// nothing of the label code or of Embree is used.
+class Oracle {
+ public:
+  Oracle(const Scene& scene, const Vector3d& eye) : scene_(scene), eye_(eye) {
+    for (const Triangle& t : scene.triangles) {
+      Corners c;
+      for (size_t k = 0; k < 3; ++k) {
+        c.p[k] = scene.vertices[static_cast<size_t>(t.vertices[k])].cast<double>();
+      }
+      c.face = t.face;
+      triangles_.push_back(c);
+    }
+  }
+
+  [[nodiscard]] bool hidden(const Edge& edge, const Vector3d& point) const {
+    const Vector3d d = point - eye_;
+    constexpr double kBefore = 1 - 1e-5;
+    for (const Corners& t : triangles_) {
+      if (edge.source == EdgeSource::kRodCentre) {
+        const Rod& rod = scene_.rods[static_cast<size_t>(edge.rod)];
+        if (t.face >= rod.first_face && t.face < rod.first_face + rod.face_count) continue;
+      }
+      // Signed volumes: the segment goes through the triangle iff all three have one sign.
+      const Vector3d a = t.p[0] - eye_, b = t.p[1] - eye_, c = t.p[2] - eye_;
+      const double u = d.dot(a.cross(b)), v = d.dot(b.cross(c)), w = d.dot(c.cross(a));
+      if (!((u > 0 && v > 0 && w > 0) || (u < 0 && v < 0 && w < 0))) continue;
+      const double s = a.dot(b.cross(c)) / (u + v + w);
+      if (!(s > 0 && s < kBefore)) continue;
+      const Vector3d n = (t.p[1] - t.p[0]).cross(t.p[2] - t.p[0]).normalized();
+      const bool in_plane =
+          std::abs(n.dot(edge.from - t.p[0])) < 5e-6 && std::abs(n.dot(edge.to - t.p[0])) < 5e-6;
+      if (!in_plane) return true;
+    }
+    for (const Sphere& sphere : scene_.spheres) {
+      const Vector3d m = eye_ - sphere.centre.cast<double>();
+      const double r = static_cast<double>(sphere.radius);
+      const double a = d.squaredNorm(), b = m.dot(d), c = m.squaredNorm() - r * r;
+      const double disc = b * b - a * c;
+      if (disc <= 0) continue;
+      const double s = (-b - std::sqrt(disc)) / a;
+      if (s > 0 && s < kBefore) return true;
+    }
+    for (const Disc& disc : scene_.discs) {
+      const Vector3d n = disc.normal.cast<double>(), centre = disc.centre.cast<double>();
+      const double s = n.dot(centre - eye_) / n.dot(d);
+      if (s > 0 && s < kBefore &&
+          (eye_ + s * d - centre).norm() < static_cast<double>(disc.radius)) {
+        return true;
+      }
+    }
+    return false;
+  }
+
+ private:
+  struct Corners {
+    std::array<Vector3d, 3> p;
+    int face = 0;
+  };
+  const Scene& scene_;
+  Vector3d eye_;
+  std::vector<Corners> triangles_;
+};
+
+bool looksAway(const Scene& scene, const Edge& edge, const Vector3d& eye) {
+  if (edge.source == EdgeSource::kRodCentre) return false;
+  bool away = true;
+  for (const int f : {edge.face0, edge.face1}) {
+    if (f < 0) continue;
+    const Face& face = scene.faces[static_cast<size_t>(f)];
+    away = away && face.normal.dot(eye - face.origin) <= 0;
+  }
+  return away;
+}
+
+/// Angle from `a` to `b`, accurate for small ones.
+double angleTo(const Vector3d& a, const Vector3d& b) {
+  return std::atan2(a.cross(b).norm(), a.dot(b));
+}
+
+// Visibility by events and one ray test each agrees with brute force at random points of random
+// edges.
+TEST(VisibleSpans, AgreeWithBruteForce) {
+  size_t tested = 0, visible = 0, differ = 0;
+  for (const auto& [name, camera] : testCameras()) {
+    for (uint64_t index = 0; index < 3; ++index) {
+      const SceneView view = makeSceneView("room", 100, index);
+      const Raycaster raycaster(view.scene);
+      const auto spans = visibleSpans(view.scene, raycaster, camera, view.pose);
+      const Vector3d eye = view.pose.position_in_world;
+      const Oracle oracle(view.scene, eye);
+      std::vector<std::vector<const EdgeSpan*>> by_edge(view.scene.edges.size());
+      for (const EdgeSpan& s : spans) by_edge[static_cast<size_t>(s.edge)].push_back(&s);
+      Random random(11, index);
+      for (int k = 0; k < 4000; ++k) {
+        const int e = random.nextInt(0, static_cast<int>(view.scene.edges.size()) - 1);
+        const double t = random.next(0, 1);
+        const Edge& edge = view.scene.edges[static_cast<size_t>(e)];
+        const Vector3d point = edge.from + t * (edge.to - edge.from);
+        const Vector3d ray = view.pose.toCam(point);
+        const auto pixel = camera.project(ray);
+        const bool imaged = pixel && camera.inImage(*pixel);
+        const bool expected =
+            imaged && !looksAway(view.scene, edge, eye) && !oracle.hidden(edge, point);
+        double phi = 0, nearest_end = 1;
+        bool found = false;
+        for (const EdgeSpan* s : by_edge[static_cast<size_t>(e)]) {
+          phi = angleTo(s->arc.from, ray);
+          found = found || (phi >= s->phi0 && phi <= s->phi1);
+          nearest_end = std::min({nearest_end, std::abs(phi - s->phi0), std::abs(phi - s->phi1)});
+        }
+        if (nearest_end < 2 * kShortestSpanRad) continue;  // At an end both answers are right.
+        ++tested;
+        visible += expected ? 1U : 0U;
+        if (found != expected) {
+          ++differ;
+          ADD_FAILURE() << name << " room " << index << " edge " << e << " t " << t << ": span "
+                        << found << ", brute force " << expected;
+        }
+      }
+    }
+  }
+  std::printf("visibility: %zu points, %zu visible, %zu differ\n", tested, visible, differ);
+  EXPECT_GT(tested, 40000U);
+  EXPECT_GT(visible, 4000U);
+  EXPECT_LT(visible, tested / 2);
+}
+
+// Just inside an occluded end the edge is seen, just outside it is hidden.
+TEST(VisibleSpans, EndWhereBruteForceSaysSo) {
+  size_t ends = 0, exact = 0;
+  constexpr double kStep = 3e-6;
+  for (const auto& [name, camera] : testCameras()) {
+    const SceneView view = makeSceneView("room", 101, 2);
+    const Raycaster raycaster(view.scene);
+    const auto spans = visibleSpans(view.scene, raycaster, camera, view.pose);
+    const Oracle oracle(view.scene, view.pose.position_in_world);
+    for (size_t k = 0; k < spans.size(); k += 3) {
+      const EdgeSpan& span = spans[k];
+      if (span.phi1 - span.phi0 < 20 * kStep) continue;
+      const Edge& edge = view.scene.edges[static_cast<size_t>(span.edge)];
+      const double angle = span.arc.angle();
+      const auto hiddenAt = [&](double phi) {
+        // The point of the edge's line that the direction meets.
+        const Vector3d d = view.pose.cam_from_world.transpose() * span.arc.at(phi / angle);
+        const Vector3d u = edge.to - edge.from, w = edge.from - view.pose.position_in_world;
+        const Vector3d n = u.cross(d);
+        const double s = d.cross(w).dot(n) / n.squaredNorm();
+        return oracle.hidden(edge, edge.from + s * u);
+      };
+      for (size_t end = 0; end < 2; ++end) {
+        if (span.ends[end] != EndKind::kOccluder) continue;
+        const double phi = end == 0 ? span.phi0 : span.phi1, out = end == 0 ? -1 : 1;
+        if (phi + out * kStep < 0 || phi + out * kStep > angle) continue;
+        ++ends;
+        // Where a rod enters a ball, the ball's surface is only phi * distance before it.
+        const double step = edge.rod >= 0 ? 10 * kStep : kStep;
+        if (!hiddenAt(phi - out * step) && hiddenAt(phi + out * step)) ++exact;
+      }
+    }
+  }
+  std::printf("occluded ends: %zu of %zu within 3e-6 rad\n", exact, ends);
+  EXPECT_GT(ends, 300U);
+  // Where an outline meets the edge under a tiny angle, or two occluders hand over, 3e-6 rad along
+  // the edge is nothing across it.
+  EXPECT_GE(static_cast<double>(exact), 0.99 * static_cast<double>(ends));
+}
+
+struct Made {
+  SceneView view;
+  Labels labels;
+  std::vector<EdgeSpan> spans;
+};
+
+Made make(const Camera& camera, uint64_t seed, uint64_t index) {
+  Made m{makeSceneView("room", seed, index), {}, {}};
+  const Raycaster raycaster(m.view.scene);
+  const Shader shader(m.view.scene);
+  m.spans = visibleSpans(m.view.scene, raycaster, camera, m.view.pose);
+  m.labels =
+      makeLabels(m.view.scene, raycaster, shader, camera, m.view.pose, SensorOptions{}, m.spans);
+  return m;
+}
+
+TEST(Labels, PointsLieOnTheProjectionOfTheirEdge) {
+  size_t points = 0, behind = 0;
+  for (const auto& [name, camera] : testCameras()) {
+    const Made m = make(camera, 102, 0);
+    ASSERT_GT(m.labels.lines.size(), 50U) << name;
+    for (const LabelLine& line : m.labels.lines) {
+      EXPECT_NEAR(line.normal.norm(), 1, 1e-12);
+      for (size_t end = 0; end < 2; ++end) {
+        const Vector3d& p = line.points_in_cam[end];
+        EXPECT_LT(std::abs(line.normal.dot(p.normalized())), 1e-12);
+        const auto pixel = camera.project(p);
+        ASSERT_TRUE(pixel) << name;
+        // Points are rounded to 1e-6 px. An end at the rim is as good as the domain's bound allows.
+        const double tolerance = line.ends[end] == EndKind::kRim ? 1e-3 : 2e-6;
+        EXPECT_LT((*pixel - (end == 0 ? line.points.front() : line.points.back())).norm(),
+                  tolerance)
+            << name << " line " << line.id;
+        const Edge& edge = m.view.scene.edges[static_cast<size_t>(line.edge)];
+        const Vector3d u = (edge.to - edge.from).normalized();
+        const Vector3d world =
+            m.view.pose.cam_from_world.transpose() * p + m.view.pose.position_in_world;
+        EXPECT_LT(u.cross(world - edge.from).norm(), 1e-9);
+        behind += p.z() < 0 ? 1U : 0U;
+      }
+      EXPECT_NEAR(angleTo(line.points_in_cam[0], line.points_in_cam[1]), line.angle_rad, 1e-9);
+      for (const Vector2d& p : line.points) {
+        const auto ray = camera.unproject(p);
+        if (!ray) continue;  // At the rim, by rounding.
+        const auto back = camera.project(*ray - line.normal * line.normal.dot(*ray));
+        if (!back) continue;  // At the rim, by rounding.
+        ++points;
+        EXPECT_LT((*back - p).norm(), 3e-6) << name << " line " << line.id;
+        EXPECT_TRUE(camera.inImage(p));
+      }
+      double length = 0;
+      for (size_t i = 1; i < line.points.size(); ++i) {
+        length += (line.points[i] - line.points[i - 1]).norm();
+      }
+      EXPECT_NEAR(line.length_px, length, 1e-5 * static_cast<double>(line.points.size()));
+      EXPECT_TRUE(line.contrast >= line.contrast_min - 1e-9 && line.contrast_min >= 0 &&
+                  line.contrast <= 255);
+    }
+  }
+  EXPECT_GT(points, 3000U);
+  EXPECT_GT(behind, 20U);  // Cameras past 90 degrees see lines behind the image plane.
+}
+
+TEST(Labels, JunctionsAreWhereLabelsMeet) {
+  const auto cameras = testCameras();
+  const Made m = make(cameras[0].second, 103, 1);
+  ASSERT_GT(m.labels.junctions.size(), 20U);
+  for (const Junction& junction : m.labels.junctions) {
+    EXPECT_GE(junction.lines.size(), 2U);
+    for (const int id : junction.lines) {
+      const LabelLine& line = m.labels.lines[static_cast<size_t>(id)];
+      ASSERT_EQ(line.id, id);
+      const bool first =
+          line.ends[0] == EndKind::kVertex && (line.points.front() - junction.point).norm() < 0.05;
+      const bool last =
+          line.ends[1] == EndKind::kVertex && (line.points.back() - junction.point).norm() < 0.05;
+      EXPECT_TRUE(first || last);
+    }
+  }
+}
+
+// The spans are arcs in space: another lens at the same place sees the same ones.
+TEST(Labels, AgreeBetweenCameraModels) {
+  const auto cameras = testCameras();
+  size_t compared = 0;
+  for (size_t a = 0; a < cameras.size(); ++a) {
+    const size_t b = (a + 1) % cameras.size();
+    const SceneView view = makeSceneView("room", 104, a);
+    const Raycaster raycaster(view.scene);
+    const Camera& other = cameras[b].second;
+    const auto spans_a = visibleSpans(view.scene, raycaster, cameras[a].second, view.pose);
+    const auto spans_b = visibleSpans(view.scene, raycaster, other, view.pose);
+    for (const EdgeSpan& s : spans_a) {
+      // All of it well inside the other image.
+      bool inside = true;
+      for (size_t end = 0; end < 2; ++end) {
+        inside = inside && (s.ends[end] == EndKind::kVertex || s.ends[end] == EndKind::kOccluder);
+      }
+      const double angle = s.arc.angle();
+      for (int k = 0; k <= 16; ++k) {
+        const auto p = other.project(s.arc.at((s.phi0 + (s.phi1 - s.phi0) * k / 16) / angle));
+        inside =
+            inside && p && other.inImage(*p + Vector2d(1, 1)) && other.inImage(*p - Vector2d(1, 1));
+      }
+      if (!inside) continue;
+      ++compared;
+      const bool same = std::any_of(spans_b.begin(), spans_b.end(), [&](const EdgeSpan& t) {
+        return t.edge == s.edge && std::abs(t.phi0 - s.phi0) <= 1e-9 &&
+               std::abs(t.phi1 - s.phi1) <= 1e-9 && t.arc.normal == s.arc.normal;
+      });
+      EXPECT_TRUE(same) << cameras[a].first << " against " << cameras[b].first << " edge "
+                        << s.edge;
+    }
+  }
+  EXPECT_GT(compared, 500U);
+}
+
+/// A bright wall at z = 2 m ahead of a camera at the origin that looks along +z of the world,
+/// behind a dark rod of the given radius at 1 m.
+Scene wallAndRod(double radius, double x) {
+  SceneBuilder builder;
+  Frame3 wall;
+  wall.origin = {-4, 4, 2};
+  wall.axes.col(0) = Vector3d(1, 0, 0);
+  wall.axes.col(1) = Vector3d(0, -1, 0);
+  wall.axes.col(2) = Vector3d(0, 0, -1);
+  builder.addPanel(wall, 0, 8, 8, Panel{{0, 0.8}, {}});
+  builder.addRod({x, -0.25, 1}, {x, 0.25, 1}, radius, 4, {0, 0.2});
+  builder.finish();
+  return std::move(builder.scene);
+}
+
+// A rod far thinner than a pixel takes its share of every pixel on its way.
+TEST(Render, SubPixelRodsCoverTheirShare) {
+  const std::array<double, 4> params{500, 500, 159.5, 127.5};
+  const Camera camera = makeCamera("pinhole", params, 320, 256);
+  const CameraRays rays(camera);
+  for (const double radius : {5e-5, 2e-4, 1e-3}) {
+    const Scene scene = wallAndRod(radius, 0.0371);
+    const Raycaster raycaster(scene);
+    const Shader shader(scene);
+    const Pose pose;
+    const auto spans = visibleSpans(scene, raycaster, camera, pose);
+    const auto image = renderRadiance(scene, raycaster, shader, rays, pose, spans, 1).radiance;
+    // Square section, corners to x and y or sides: the width seen is between 2 r / sqrt(2) and 2 r.
+    double missing = 0;
+    constexpr int kFirst = 60, kLast = 200;
+    for (int y = kFirst; y < kLast; ++y) {
+      double row = 0;
+      for (int x = 0; x < 320; ++x) {
+        row += 0.8 - static_cast<double>(image[static_cast<size_t>(y * 320 + x)]);
+      }
+      missing += row / 0.6 / (kLast - kFirst);
+    }
+    EXPECT_GT(missing, 0.97 * std::sqrt(2.0) * radius * 500) << radius;
+    EXPECT_LT(missing, 1.03 * 2 * radius * 500) << radius;
+    const Labels labels =
+        makeLabels(scene, raycaster, shader, camera, pose, SensorOptions{}, spans);
+    ASSERT_EQ(labels.lines.size(), 1U);
+    EXPECT_EQ(labels.lines[0].kind, LineKind::kWire);
+    EXPECT_NEAR(labels.lines[0].points.front().x(), 500 * 0.0371 + 159.5, 1e-5);
+    EXPECT_NEAR(labels.lines[0].length_px, 250, 1e-5);
+  }
+}
+
+TEST(Labels, ThickRodsAreLabelledByTheirSides) {
+  const std::array<double, 4> params{500, 500, 159.5, 127.5};
+  const Camera camera = makeCamera("pinhole", params, 320, 256);
+  const Scene scene = wallAndRod(0.01, 0.02);
+  const Raycaster raycaster(scene);
+  const Shader shader(scene);
+  const Labels labels = makeLabels(scene,
+                                   raycaster,
+                                   shader,
+                                   camera,
+                                   Pose{},
+                                   SensorOptions{},
+                                   visibleSpans(scene, raycaster, camera, Pose{}));
+  EXPECT_GE(labels.lines.size(), 4U);
+  for (const LabelLine& line : labels.lines) {
+    EXPECT_NE(line.kind, LineKind::kWire);
+  }
+  const auto longest = std::count_if(labels.lines.begin(), labels.lines.end(), [](const auto& l) {
+    return l.kind == LineKind::kSilhouette && l.length_px > 200 && std::abs(l.contrast - 153) < 1;
+  });
+  EXPECT_EQ(longest, 2);
+}
+
+}  // namespace
+}  // namespace dlsd
