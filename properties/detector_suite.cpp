@@ -38,7 +38,8 @@ Camera drawCamera(std::string_view model, uint64_t seed) {
   return gen(rc::Random(seed), 100).value();
 }
 
-constexpr const char* kScenes[] = {"polyhedra", "room", "polyhedra", "paper"};
+constexpr const char* kScenes[] = {
+    "polyhedra", "room", "polyhedra", "polyhedra", "paper", "polyhedra"};
 
 struct Pool {
   long eligible = 0, qualified = 0, found = 0;
