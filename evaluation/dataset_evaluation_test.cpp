@@ -176,7 +176,7 @@ TEST_F(DatasetEvaluation, ErrorsNameTheFirstBadFrame) {
     });
   };
   EXPECT_EQ(run(1), "accepted");
-  for (const size_t bad : {4, 2}) {
+  for (const size_t bad : {4U, 2U}) {
     records[bad].lines.push_back(hand_made::detection({{5, 5}, {5, 5}}));
     for (const int jobs : {1, 3}) {
       EXPECT_EQ(run(jobs),

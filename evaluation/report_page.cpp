@@ -15,13 +15,13 @@ h2 { font-size: 17px; margin: 32px 0 10px; }
 p { margin: 4px 0 0; color: var(--dim); }
 .scroll { overflow-x: auto; background: var(--card); border: 1px solid var(--line); border-radius: 8px; margin-top: 10px; }
 table { border-collapse: collapse; width: 100%; font-variant-numeric: tabular-nums; }
-th, td { padding: 7px 14px; text-align: right; white-space: nowrap; border-bottom: 1px solid var(--line); }
+th, td { padding: 7px 10px; text-align: right; white-space: nowrap; border-bottom: 1px solid var(--line); }
 th:first-child, td:first-child { text-align: left; }
 tbody tr:last-child > * { border-bottom: 0; }
 thead th { font-weight: 600; color: var(--dim); font-size: 13px; }
 thead .group { text-align: center; border-left: 1px solid var(--line); }
 tr.all td { font-weight: 600; border-top: 2px solid var(--line); }
-small { color: var(--dim); font-size: 12px; margin-left: 6px; }
+small { color: var(--dim); font-size: 12px; margin-left: 5px; }
 dl { display: flex; flex-wrap: wrap; gap: 10px; margin: 10px 0 0; }
 dl div { background: var(--card); border: 1px solid var(--line); border-radius: 8px; padding: 10px 16px; }
 dt { color: var(--dim); font-size: 13px; }
