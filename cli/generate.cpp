@@ -1,6 +1,7 @@
 #include "synth/generate.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
@@ -12,6 +13,7 @@
 #include "cameras/calibration/calibration.h"
 #include "cameras/calibration/files.h"
 #include "cli/command.h"
+#include "synth/scene.h"
 
 namespace dlsd::cli {
 namespace {
@@ -63,7 +65,8 @@ int run(Arguments& arguments) {
 
   GenerateResult result{};
   {
-    Progress progress("frames", size_t(options.count / options.shard_count));
+    const int own = options.count - options.shard_index + options.shard_count - 1;
+    Progress progress("frames", size_t(own / options.shard_count));
     result =
         generateDataset(options, [&](const GenerateProgress& p) { progress.done(size_t(p.done)); });
   }
@@ -91,7 +94,10 @@ Run addGenerate(CLI::App& command) {
       ->expected(1)
       ->take_all();
   command.add_option("--out", options.out, "Folder for the dataset")->type_name("DIR")->required();
-  command.add_option("--scene", options.scene, "Scene preset: room or paper")
+  command
+      .add_option("--scene",
+                  options.scene,
+                  fmt::format("Scene preset: {}", fmt::join(scenePresets(), ", ")))
       ->type_name("NAME")
       ->capture_default_str();
   command.add_option("--count", options.count, "Frames")->capture_default_str();
