@@ -337,7 +337,9 @@ std::string kalibrYaml(const std::vector<NamedCamera>& cameras) {
   if (cameras.empty()) throw std::invalid_argument("a camchain needs at least one camera");
   std::set<std::string> seen;
   std::string text;
-  for (const auto& [name, camera] : cameras) {
+  for (const NamedCamera& entry : cameras) {
+    const std::string& name = entry.name;
+    const Camera& camera = entry.camera;
     if (!isCameraName(name) || !seen.insert(name).second) {
       throw std::invalid_argument("camera name " + inQuotes(name) +
                                   " in a camchain: allowed are cam0, cam1, ..., each once");

@@ -23,7 +23,8 @@ struct NamedCamera {
 
 /// Kalibr camchain text; exact: reading it back gives cameras that compare equal. A limit of the
 /// field angle is written as our extension `max_field_angle` (rad), with a comment that marks it as
-/// ours.
+/// ours. Throws std::invalid_argument if there is no camera, or names are not cam0, cam1, ..., each
+/// once.
 [[nodiscard]] std::string kalibrYaml(const std::vector<NamedCamera>& cameras);
 
 /// Writes kalibrYaml atomically.

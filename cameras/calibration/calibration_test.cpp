@@ -360,5 +360,45 @@ TEST_F(Calibration, ColonsMayBePartOfThePath) {
   EXPECT_THROW((void)loadCamera(path("x:y/absent.yaml")), InputError);
 }
 
+TEST(CalibrationFixtures, AreCompleteAndLookAsFarAsTheyShould) {
+  const std::string folder = std::string(DLSD_SOURCE_DIR) + "/fixtures/calibrations/";
+  struct {
+    std::string file, model;
+    int width, height;
+    double corner_deg;  // Field angle of the top-left corner; 0 where it has no ray.
+  } const expected[] = {{"tum_mono_wide", "fov", 1280, 1024, 98.1},
+                        {"tum_vi_cam0", "kannala_brandt", 512, 512, 0},
+                        {"fisheye_180", "kannala_brandt", 1280, 1024, 0},
+                        {"catadioptric", "omni", 1280, 1024, 0},
+                        {"pinhole_90", "pinhole", 1280, 1024, 52.0}};
+  size_t files = 0;
+  for (const auto& entry : fs::directory_iterator(folder)) {
+    files += static_cast<size_t>(entry.path().extension() == ".yaml");
+  }
+  EXPECT_EQ(files, std::size(expected));
+  for (const auto& e : expected) {
+    const Camera camera = loadCamera(folder + e.file + ".yaml");
+    EXPECT_EQ(camera.modelName(), e.model);
+    EXPECT_EQ(camera.width(), e.width);
+    EXPECT_EQ(camera.height(), e.height);
+    const auto corner = camera.unproject({-0.5, -0.5});
+    EXPECT_EQ(corner.has_value(), e.corner_deg > 0) << e.file;
+    if (corner) {
+      EXPECT_NEAR(std::acos(corner->z()) * 180 / M_PI, e.corner_deg, 0.5) << e.file;
+    }
+    // The image circle of the two that have one is complete in the image.
+    if (camera.maxFieldAngleLimit() < M_PI) {
+      const double limit = camera.maxFieldAngleLimit() * (1 - 1e-12);
+      for (int i = 0; i < 360; ++i) {
+        const double azimuth = i * M_PI / 180;
+        const auto pixel = camera.project({std::sin(limit) * std::cos(azimuth),
+                                           std::sin(limit) * std::sin(azimuth),
+                                           std::cos(limit)});
+        ASSERT_TRUE(pixel && camera.inImage(*pixel)) << e.file << " " << i;
+      }
+    }
+  }
+}
+
 }  // namespace
 }  // namespace dlsd
