@@ -265,29 +265,27 @@ CameraRays::CameraRays(const Camera& camera) : camera_(camera) {
       z_[j * columns + i] = ok ? static_cast<float>(z[i]) : 1;
     }
   }
+  // The interpolated ray of each pixel's centre must project back onto it.
   std::vector<uint8_t> valid(columns);
   for (size_t j = 0; j + 1 < rows; ++j) {
-    for (size_t i = 0; i < columns; ++i) {
-      u[i] = static_cast<double>(i);
-      v[i] = static_cast<double>(j);
-    }
-    unprojectAll(camera_, u, v, x, y, z, valid);
+    const int jj = static_cast<int>(j);
     for (size_t i = 0; i + 1 < columns; ++i) {
-      const int ii = static_cast<int>(i), jj = static_cast<int>(j);
-      bool exact = valid[i] == 0 || !cornerValid(ii, jj) || !cornerValid(ii + 1, jj) ||
-                   !cornerValid(ii, jj + 1) || !cornerValid(ii + 1, jj + 1);
-      if (!exact) {
-        const Eigen::Vector3d a = cornerRay(ii, jj).cast<double>();
-        const Eigen::Vector3d b = cornerRay(ii + 1, jj).cast<double>();
-        const Eigen::Vector3d c = cornerRay(ii, jj + 1).cast<double>();
-        const Eigen::Vector3d d = cornerRay(ii + 1, jj + 1).cast<double>();
-        const Eigen::Vector3d centre(x[i], y[i], z[i]);
-        const double err = (a + b + c + d).normalized().cross(centre).norm();
-        const double px = std::min((a - b).norm(), (a - c).norm());
-        // Float directions alone are 1e-7 off; where a pixel is that small, nothing better exists.
-        exact = !(err <= kMaxErrPx * px + 1e-7);
-      }
-      exact_[j * (columns - 1) + i] = exact ? 1 : 0;
+      const int ii = static_cast<int>(i);
+      const Eigen::Vector3d centre = (cornerRay(ii, jj) + cornerRay(ii + 1, jj) +
+                                      cornerRay(ii, jj + 1) + cornerRay(ii + 1, jj + 1))
+                                         .cast<double>();
+      x[i] = centre.x();
+      y[i] = centre.y();
+      z[i] = centre.z();
+    }
+    projectAll(camera_, x, y, z, u, v, valid);
+    for (size_t i = 0; i + 1 < columns; ++i) {
+      const int ii = static_cast<int>(i);
+      const bool corners_valid = cornerValid(ii, jj) && cornerValid(ii + 1, jj) &&
+                                 cornerValid(ii, jj + 1) && cornerValid(ii + 1, jj + 1);
+      const double err = std::hypot(u[i] - static_cast<double>(i), v[i] - static_cast<double>(j));
+      const bool interpolates = corners_valid && valid[i] != 0 && err <= kMaxErrPx;
+      exact_[j * (columns - 1) + i] = interpolates ? 0 : 1;
     }
   }
 }
