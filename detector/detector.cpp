@@ -294,7 +294,7 @@ void Detector::Impl::traceSeeds() {
     const auto traced = tracer.trace(field, thresholds, noise, seed.trace);
     if (!traced) continue;
     if (traced->length_px < v.min_length_px || traced->score < v.min_score) continue;
-    if (std::abs(traced->bend_px) > v.max_bend_px + 3 * traced->bend_sigma_px) continue;
+    if (traced->is_arc) continue;
     size_t shared = 0;
     for (const uint32_t pixel : tracer.crestPixels()) shared += claimed[pixel];
     if (2 * shared >= tracer.crestPixels().size()) continue;

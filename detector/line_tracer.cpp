@@ -166,6 +166,40 @@ void LineTracer::cutTail(std::vector<Step>* steps) {
   }
 }
 
+/// Residuals of an arc of radius r and length l against its best plane are a parabola of height
+/// (sagitta) l^2 / (8 r), which is fitted here.
+bool LineTracer::isArc(const std::vector<Step>& steps, const Eigen::Vector3d& normal) const {
+  // Corners round the last pixels off.
+  constexpr size_t kEndPx = 3;
+  // What the crests of edges without noise leave.
+  constexpr double kFloorPx = 0.15;
+  if (steps.size() < 2 * kEndPx + 8) return false;
+  const double half_length_px = 0.5 * static_cast<double>(steps.size() - 1 - 2 * kEndPx);
+  double n = 0, sum_r = 0, sum_q = 0, sum_qq = 0, sum_qr = 0, sum_rr = 0;
+  for (size_t i = kEndPx; i + kEndPx < steps.size(); ++i) {
+    const Step& s = steps[i];
+    if (!s.is_edge) continue;
+    const double t = static_cast<double>(i - kEndPx) / half_length_px - 1;  // -1 ... 1
+    const double q = t * t, r = s.ray.dot(normal) * s.px_per_rad;
+    n += 1;
+    sum_r += r;
+    sum_q += q;
+    sum_qq += q * q;
+    sum_qr += q * r;
+    sum_rr += r * r;
+  }
+  if (n < 8) return false;
+  const double qq = sum_qq - sum_q * sum_q / n;
+  const double qr = sum_qr - sum_q * sum_r / n;
+  const double rr = sum_rr - sum_r * sum_r / n;
+  if (!(qq > 0)) return false;
+  const double sagitta_px = std::abs(qr) / qq;
+  const double variance = std::max(0.0, rr - qr * qr / qq) / (n - 3);
+  const double sigma_px = std::sqrt(variance / qq * AlignmentCounter::kCorrelatedPx);
+  return sagitta_px > kFloorPx + 3 * sigma_px &&
+         half_length_px * half_length_px < 2 * sagitta_px * options_.min_bend_radius_px;
+}
+
 LineTracer::End LineTracer::endOf(const Step& last, int direction, bool at_border) const {
   End end{last.crest_px, last.ray};
   if (!at_border) return end;
@@ -253,8 +287,6 @@ std::optional<TracedLine> LineTracer::trace(const GradientField& field,
   line.score = alignment.score(field.width, field.height);
   double sum2 = 0;
   line.max_px = 0;
-  double inner = 0, outer = 0;
-  int inner_count = 0, outer_count = 0;
   line.length_px = 0;
   for (size_t i = 0; i < steps.size(); ++i) {
     const Step& s = steps[i];
@@ -264,20 +296,13 @@ std::optional<TracedLine> LineTracer::trace(const GradientField& field,
     const double err = reprojectionErrorFirstOrder(sample, fit->normal);
     sum2 += err * err;
     line.max_px = std::max(line.max_px, err);
-    const double signed_err = s.ray.dot(fit->normal) * s.px_per_rad;
-    const bool is_inner = 4 * i >= steps.size() && 4 * i < 3 * steps.size();
-    (is_inner ? inner : outer) += signed_err;
-    ++(is_inner ? inner_count : outer_count);
     const double nx = static_cast<double>(s.nx), ny = static_cast<double>(s.ny);
     const double side = sample.du.dot(fit->normal) * nx + sample.dv.dot(fit->normal) * ny;
     polarity += side < 0 ? -s.polarity : s.polarity;
   }
-  line.edge_points = inner_count + outer_count;
-  if (inner_count == 0 || outer_count == 0) return std::nullopt;
+  line.edge_points = static_cast<int>(crest_pixels_.size());
   line.rms_px = std::sqrt(sum2 / line.edge_points);
-  line.bend_px = inner / inner_count - outer / outer_count;
-  line.bend_sigma_px =
-      2 * line.rms_px * std::sqrt(AlignmentCounter::kCorrelatedPx / line.edge_points);
+  line.is_arc = isArc(steps, fit->normal);
   line.polarity = polarity < 0 ? -1 : 1;
   normal_ = normal_.dot(fit->normal) < 0 ? Eigen::Vector3d(-fit->normal) : fit->normal;
   const End from = endOf(steps.front(), -1, back.at_border);

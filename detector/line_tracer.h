@@ -31,8 +31,7 @@ struct TracedLine {
   double length_px;                  ///< Along the curve.
   int edge_points;
   double rms_px, max_px;  ///< Reprojection errors of the edge points.
-  double bend_px;         ///< Mean residual of the middle half minus that of the outer half.
-  double bend_sigma_px;   ///< Standard deviation of bend_px for independent residuals.
+  bool is_arc;            ///< Bends with a radius below min_bend_radius_px.
   int polarity;           ///< +1: brighter on the side fit.normal points to.
   double score;
 };
@@ -93,6 +92,7 @@ class LineTracer {
               std::vector<Step>* steps,
               Front* front);
   bool refit();
+  [[nodiscard]] bool isArc(const std::vector<Step>& steps, const Eigen::Vector3d& normal) const;
   [[nodiscard]] End endOf(const Step& last, int direction, bool at_border) const;
   static void cutTail(std::vector<Step>* steps);
 

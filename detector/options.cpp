@@ -44,7 +44,7 @@ void ValidationOptions::check() const {
   require("validation.tight_rho_px", tight_rho_px, 0, rho_px, false);
   require("validation.max_residual_sigmas", max_residual_sigmas, 1, 100);
   require("validation.max_gap_px", max_gap_px, 0, 1000);
-  require("validation.max_bend_px", max_bend_px, 0, 100, false);
+  require("validation.min_bend_radius_px", min_bend_radius_px, 0, 1e9);
   require("validation.min_length_px", min_length_px, 2, 10000);
   require("validation.min_score", min_score, -100, 1e6);
 }

@@ -46,8 +46,10 @@ struct ValidationOptions {
   /// The default's tests, made along the curve of the fitted plane in steps of one pixel.
   double tight_rho_px = 0.5;       ///< Bound for edges of little noise. In (0, rho_px].
   double max_residual_sigmas = 3;  ///< Bound in standard deviations of the residuals. In [1, 100].
-  int max_gap_px = 7;         ///< Steps without an edge that do not end the line. In [0, 1000].
-  double max_bend_px = 0.25;  ///< Middle half of the residuals against the outer half. In (0, 100].
+  int max_gap_px = 7;  ///< Steps without an edge that do not end the line. In [0, 1000].
+  /// Edges that bend away from the plane's image with a smaller radius, by more than noise
+  /// explains, are arcs of curved things. In [0, 1e9]; 0 switches the test off.
+  double min_bend_radius_px = 500;
   double min_length_px = 15;  ///< In [2, 10000].
   double min_score = 0;       ///< -log10 of the number of false alarms. In [-100, 1e6].
   void check() const;
