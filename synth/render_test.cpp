@@ -111,7 +111,10 @@ StepFit fitStep(const std::vector<double>& x,
 TEST(Render, EdgesLieOnTheirLabels) {
   std::vector<double> errors;
   size_t fits = 0, poor = 0;
-  for (const auto& [name, camera] : testCameras(1)) {
+  for (const auto& named : testCameras(1)) {
+    // Not a structured binding: lambdas below use the camera.
+    const std::string& name = named.first;
+    const Camera& camera = named.second;
     if (name == "omni" || name == "pinhole") continue;  // Two full pictures keep the test quick.
     GenerateOptions options;
     options.cameras = {{name, camera}};
