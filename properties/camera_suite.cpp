@@ -3,6 +3,7 @@
 // camera and many rays or pixels; the worst errors seen are printed in units of what is allowed.
 
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <Eigen/Geometry>
 #include <Eigen/SVD>
@@ -576,8 +577,8 @@ TYPED_TEST(CameraSuite, BatchesEqualSinglePoints) {
 }
 
 TYPED_TEST(CameraSuite, KalibrFilesGiveBackTheSameCamera) {
-  const std::string path =
-      ::testing::TempDir() + "dlsd_camera_suite_" + std::string(TypeParam::kName) + ".yaml";
+  const std::string path = ::testing::TempDir() + "dlsd_camera_suite_" +
+                           std::string(TypeParam::kName) + std::to_string(::getpid()) + ".yaml";
   holds([&] {
     const Camera a = *genCamera<TypeParam>(drawRange());
     const Camera b = *genAnyCamera(Range::kAdmissible);
