@@ -101,7 +101,7 @@ struct Cli : testing::Test {
 
 TEST_F(Cli, HelpShowsExamples) {
   for (const char* command :
-       {"generate", "detect", "evaluate", "camera", "camera show", "report"}) {
+       {"generate", "detect", "evaluate", "camera", "camera show", "report", "replay"}) {
     SCOPED_TRACE(command);
     const Result result = dlsd(std::string(command) + " --help");
     EXPECT_EQ(result.code, 0);

@@ -21,6 +21,7 @@ Run addDetect(CLI::App& command);
 Run addEvaluate(CLI::App& command);
 Run addCamera(CLI::App& command);
 Run addReport(CLI::App& command);
+Run addReplay(CLI::App& command);
 
 /// Writes to standard output and makes sure it arrived. Throws SystemError if it did not.
 void print(std::string_view text);

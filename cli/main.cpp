@@ -30,6 +30,7 @@ constexpr Entry kCommands[] = {
     {"evaluate", "Compare detections with the exact labels of a dataset.", addEvaluate},
     {"camera", "Look at calibration files.", addCamera},
     {"report", "Write a static HTML page of a dataset and its detections.", addReport},
+    {"replay", "Make a saved property case again and check it.", addReplay},
 };
 
 int run(int argc, char** argv) {

@@ -159,11 +159,17 @@ class Worst {
   long count_ = 0;
 };
 
-/// Runs a property and demands that it was really tried: `tried` items per successful case at
-/// least.
+/// Runs a property and returns the number of its cases. How much it has tried, the caller counts
+/// and compares with that: a property that skips everything fails.
 template <class Property>
-void holds(const Property& property) {
-  EXPECT_TRUE(rc::check(property)) << "see the counterexample above";
+long holds(const Property& property) {
+  long cases = 0;
+  EXPECT_TRUE(rc::check([&] {
+    ++cases;
+    property();
+  })) << "see the counterexample above";
+  EXPECT_GT(cases, 0);
+  return cases;
 }
 
 template <class M>
@@ -200,7 +206,7 @@ Range drawRange() {
 TYPED_TEST(CameraSuite, PixelsInsideTheImageComeBack) {
   Worst worst("pixel -> ray -> pixel, in units of 1e-10 px");
   long seen = 0, drawn = 0;
-  holds([&] {
+  const long cases = holds([&] {
     const Camera camera = *genCamera<TypeParam>(Range::kRealistic);
     for (const Vector2d& pixel :
          many(rc::gen::oneOf(genPixelInImage(camera), genPixelOnBorder(camera)))) {
@@ -219,14 +225,14 @@ TYPED_TEST(CameraSuite, PixelsInsideTheImageComeBack) {
       if (!(error <= kPixelRoundTrip)) RC_FAIL(describe(camera, pixel));
     }
   });
-  EXPECT_GE(seen, drawn * 6 / 10);
+  EXPECT_GE(seen, drawn / 2);
   EXPECT_GE(worst.count(), seen * 99 / 100);
 }
 
 TYPED_TEST(CameraSuite, RaysComeBack) {
   Worst worst("ray -> pixel -> ray, in units of 8 ulp(px) / smallest singular value");
   Worst worst_far("the same outside the image or in odd cameras, plus the resolution of a ray");
-  holds([&] {
+  const long cases = holds([&] {
     const Range range = drawRange();
     const Camera camera = *genCamera<TypeParam>(range);
     for (const Vector3d& ray : many(genRayFor(camera))) {
@@ -251,8 +257,8 @@ TYPED_TEST(CameraSuite, RaysComeBack) {
       }
     }
   });
-  EXPECT_GT(worst.count(), 1000);
-  EXPECT_GT(worst_far.count(), 1000);
+  EXPECT_GT(worst.count(), cases * 5);
+  EXPECT_GT(worst_far.count(), cases * 5);
 }
 
 // --- Validity
@@ -260,7 +266,7 @@ TYPED_TEST(CameraSuite, RaysComeBack) {
 
 TYPED_TEST(CameraSuite, ValidOneWayImpliesValidBack) {
   long rays = 0, pixels = 0;
-  holds([&] {
+  const long cases = holds([&] {
     const Camera camera = *genCamera<TypeParam>(drawRange());
     for (const Vector3d& ray : many(genRayFor(camera))) {
       const auto pixel = camera.project(ray);
@@ -281,13 +287,13 @@ TYPED_TEST(CameraSuite, ValidOneWayImpliesValidBack) {
       }
     }
   });
-  EXPECT_GT(rays, 2000);
-  EXPECT_GT(pixels, 2000);
+  EXPECT_GT(rays, cases * 10);
+  EXPECT_GT(pixels, cases * 10);
 }
 
 TYPED_TEST(CameraSuite, RaysAreValidExactlyInsideTheDomain) {
   long inside = 0, outside = 0;
-  holds([&] {
+  const long cases = holds([&] {
     const Camera camera = *genCamera<TypeParam>(drawRange());
     const auto& model = modelOf<TypeParam>(camera);
     const auto limit = static_cast<long double>(camera.maxFieldAngleLimit());
@@ -316,13 +322,13 @@ TYPED_TEST(CameraSuite, RaysAreValidExactlyInsideTheDomain) {
       }
     }
   });
-  EXPECT_GT(inside, 3000);
-  EXPECT_GT(outside, 500);
+  EXPECT_GT(inside, cases * 15);
+  EXPECT_GT(outside, cases * 2);
 }
 
 TYPED_TEST(CameraSuite, PixelsAreValidExactlyInsideTheDomain) {
   long inside = 0, outside = 0;
-  holds([&] {
+  const long cases = holds([&] {
     const Camera drawn = *genCamera<TypeParam>(drawRange());
     // The limit of the field angle is a bound on rays; here it is the model's own bound that
     // counts.
@@ -346,8 +352,8 @@ TYPED_TEST(CameraSuite, PixelsAreValidExactlyInsideTheDomain) {
       }
     }
   });
-  EXPECT_GT(inside, 2000);
-  EXPECT_GT(outside, 50);
+  EXPECT_GT(inside, cases * 10);
+  EXPECT_GT(outside, cases / 4);
 }
 
 TYPED_TEST(CameraSuite, ValidImpliesFiniteAndUnit) {
@@ -358,7 +364,7 @@ TYPED_TEST(CameraSuite, ValidImpliesFiniteAndUnit) {
                                     1e-9,   -1e9,   1e-17,  -1e-17,  1e-8,  640.0};
   Worst worst("| |ray| - 1 |, in ulp(1)");
   long accepted = 0;
-  holds([&] {
+  const long cases = holds([&] {
     const Camera camera = *genCamera<TypeParam>(drawRange());
     const auto checkRay = [&](const Vector3d& ray) {
       const auto pixel = camera.project(ray);
@@ -388,7 +394,7 @@ TYPED_TEST(CameraSuite, ValidImpliesFiniteAndUnit) {
     for (const Vector3d& ray : many(genRayFor(camera))) checkRay(ray);
     for (const Vector2d& pixel : many(genPixelFor(camera))) checkPixel(pixel);
   });
-  EXPECT_GT(accepted, 5000);
+  EXPECT_GT(accepted, cases * 25);
   const Camera camera = makeCamera(TypeParam::kName, TypeParam().params(), 10, 10);
   for (const double bad : {kNan, kInf, -kInf}) {
     EXPECT_FALSE(camera.project({bad, 0, 1}));
@@ -403,7 +409,7 @@ TYPED_TEST(CameraSuite, ValidImpliesFiniteAndUnit) {
 
 TYPED_TEST(CameraSuite, TheLengthOfARayDoesNotMatter) {
   Worst worst("difference, in units of 8 ulp(px) + 2 * largest singular value * ray resolution");
-  holds([&] {
+  const long cases = holds([&] {
     const Camera camera = *genCamera<TypeParam>(drawRange());
     const double scale = *genLogReal(1e-95, 1e95);
     for (const Vector3d& ray : many(genRayFor(camera))) {
@@ -421,7 +427,7 @@ TYPED_TEST(CameraSuite, TheLengthOfARayDoesNotMatter) {
       if (!((*a - *b).norm() <= allowed)) RC_FAIL(describe(camera, ray));
     }
   });
-  EXPECT_GT(worst.count(), 2000);
+  EXPECT_GT(worst.count(), cases * 10);
 }
 
 // --- Right
@@ -429,7 +435,7 @@ TYPED_TEST(CameraSuite, TheLengthOfARayDoesNotMatter) {
 
 TYPED_TEST(CameraSuite, AgreesWithTheTextbookInLongDouble) {
   Worst worst("difference, in units of 8 ulp(px) + largest singular value * ray resolution");
-  holds([&] {
+  const long cases = holds([&] {
     const Camera camera = *genCamera<TypeParam>(drawRange());
     const auto& model = modelOf<TypeParam>(camera);
     for (const Vector3d& ray : many(genRayFor(camera))) {
@@ -444,13 +450,13 @@ TYPED_TEST(CameraSuite, AgreesWithTheTextbookInLongDouble) {
       if (!(error <= allowed)) RC_FAIL(describe(camera, ray));
     }
   });
-  EXPECT_GT(worst.count(), 2000);
+  EXPECT_GT(worst.count(), cases * 10);
 }
 
 TYPED_TEST(CameraSuite, TheJacobianIsTheDerivative) {
   Worst worst("against central differences, in units of 1e-8 |J| + rounding");
   Worst euler("|J ray| / |J|, in ulp(1)");
-  holds([&] {
+  const long cases = holds([&] {
     const Camera camera = *genCamera<TypeParam>(drawRange());
     // Differences do not see the principal point, but its size costs them digits.
     TypeParam model = modelOf<TypeParam>(camera);
@@ -500,13 +506,13 @@ TYPED_TEST(CameraSuite, TheJacobianIsTheDerivative) {
       if (!(error <= allowed)) RC_FAIL(describe(camera, ray));
     }
   });
-  EXPECT_GT(euler.count(), 2000);
-  EXPECT_GT(worst.count(), 1000);
+  EXPECT_GT(euler.count(), cases * 10);
+  EXPECT_GT(worst.count(), cases * 5);
 }
 
 TYPED_TEST(CameraSuite, TheImageIsContinuousAcrossTheAxis) {
   Worst worst("deviation from J * offset, in units of 4 ulp(px)");
-  holds([&] {
+  const long cases = holds([&] {
     const Camera camera = *genCamera<TypeParam>(drawRange());
     const Vector2d centre = principalPoint(camera);
     const auto axis = camera.project({0, 0, 1});
@@ -535,7 +541,7 @@ TYPED_TEST(CameraSuite, TheImageIsContinuousAcrossTheAxis) {
       }
     }
   });
-  EXPECT_GT(worst.count(), 5000);
+  EXPECT_GT(worst.count(), cases * 25);
 }
 
 // --- Batches, files, arcs
@@ -543,7 +549,7 @@ TYPED_TEST(CameraSuite, TheImageIsContinuousAcrossTheAxis) {
 
 TYPED_TEST(CameraSuite, BatchesEqualSinglePoints) {
   long compared = 0;
-  holds([&] {
+  const long cases = holds([&] {
     const Camera camera = *genCamera<TypeParam>(drawRange());
     const size_t n = *rc::gen::elementOf(std::vector<size_t>{0, 1, 2, 3, 4, 5, 7, 8, 9, 31, 64});
     const auto rays = draw(n, genRayFor(camera));
@@ -573,13 +579,13 @@ TYPED_TEST(CameraSuite, BatchesEqualSinglePoints) {
       if (ray) RC_ASSERT(*ray == Vector3d(x[i], y[i], z[i]));
     }
   });
-  EXPECT_GT(compared, 100);
+  EXPECT_GT(compared, cases / 2);
 }
 
 TYPED_TEST(CameraSuite, KalibrFilesGiveBackTheSameCamera) {
   const std::string path = ::testing::TempDir() + "dlsd_camera_suite_" +
                            std::string(TypeParam::kName) + std::to_string(::getpid()) + ".yaml";
-  holds([&] {
+  const long cases = holds([&] {
     const Camera a = *genCamera<TypeParam>(drawRange());
     const Camera b = *genAnyCamera(Range::kAdmissible);
     saveCameras(path, {{"cam0", a}, {"cam1", b}});
@@ -620,7 +626,7 @@ TYPED_TEST(CameraSuite, TheImageOfAPlaneStaysOnItsArc) {
       "angle to the plane, in units of 8 ulp(px) / smallest singular value + ray resolution");
   Worst chord("distance of the curve to its chords, in units of 0.01 px");
   long samples = 0;
-  holds([&] {
+  const long cases = holds([&] {
     const Camera camera = *genCamera<TypeParam>(Range::kRealistic);
     for (int n = 0; n < 4; ++n) {
       const Arc arc = drawArc(camera);
@@ -654,13 +660,13 @@ TYPED_TEST(CameraSuite, TheImageOfAPlaneStaysOnItsArc) {
       }
     }
   });
-  EXPECT_GT(worst.count(), 2000);
-  EXPECT_GT(samples, 20000);
+  EXPECT_GT(worst.count(), cases * 10);
+  EXPECT_GT(samples, cases * 100);
 }
 
 TYPED_TEST(CameraSuite, SpansAreThoseOfADenseSampling) {
   long spans_seen = 0, with_gap = 0, rims = 0;
-  holds([&] {
+  const long cases = holds([&] {
     const Camera camera = *genCamera<TypeParam>(Range::kRealistic);
     for (int n = 0; n < 6; ++n) {
       const Arc arc = drawArc(camera);
@@ -718,7 +724,7 @@ TYPED_TEST(CameraSuite, SpansAreThoseOfADenseSampling) {
       }
     }
   });
-  EXPECT_GT(spans_seen, 400);
+  EXPECT_GT(spans_seen, cases * 2);
   std::cout << "    spans " << spans_seen << ", arcs with a gap " << with_gap
             << ", ends at the rim " << rims << "\n";
 }
@@ -734,7 +740,7 @@ void agreesWithOpenCv(
         projectPoints,
     double max_angle) {
   Worst worst("difference to OpenCV, in units of 1e-9 px");
-  holds([&] {
+  const long cases = holds([&] {
     const Camera camera = *genCamera<M>(Range::kRealistic);
     std::vector<cv::Point3d> points;
     std::vector<Vector2d> ours;
@@ -755,7 +761,7 @@ void agreesWithOpenCv(
       if (!(error <= 1e-9)) RC_FAIL(describe(camera, Vector2d(ours[i])));
     }
   });
-  EXPECT_GT(worst.count(), 2000);
+  EXPECT_GT(worst.count(), cases * 10);
 }
 
 template <class M>
