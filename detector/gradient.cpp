@@ -191,9 +191,9 @@ double GradientFilter::noise(const GradientField& field) const {
     const double here = histogram[bin];
     if (below + here >= rank && here > 0) {
       const double quantile = (static_cast<double>(bin) + (rank - below) / here) * (1 << kShift);
-      // 1.011 from the Rayleigh distribution; 1.037 is the mean excess of `magnitude` over the
+      // 1.011 from the Rayleigh distribution; 1.040 is the mean excess of `magnitude` over the
       // norm.
-      return quantile / (1.011 * 1.037 * kGradientUnit);
+      return quantile / (1.011 * 1.040 * kGradientUnit);
     }
     below += here;
   }

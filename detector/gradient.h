@@ -15,7 +15,7 @@ inline constexpr int kGradientUnit = 128;
 struct GradientField {
   int width = 0, height = 0;
   std::vector<int16_t> gx, gy;  ///< In 1 / kGradientUnit grey levels per px (8-bit scale).
-  /// max(|gx|, |gy|) + 3/8 min(|gx|, |gy|), within [-0, +7] % of the Euclidean norm; 0 where
+  /// max(|gx|, |gy|) + 3/8 min(|gx|, |gy|), within [-3, +7] % of the Euclidean norm; 0 where
   /// masked.
   std::vector<uint16_t> magnitude;
 

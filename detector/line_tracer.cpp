@@ -266,10 +266,11 @@ std::optional<TracedLine> LineTracer::trace(const GradientField& field,
   moments_ = {};
   AlignmentCounter alignment;
   long polarity = 0;
+  const auto min_gradient = static_cast<float>(thresholds.chain);
   crest_pixels_.clear();
   crest_along_x_.clear();
   for (const Step& s : steps) {
-    const bool has_gradient = std::hypot(s.gx, s.gy) >= static_cast<float>(thresholds.chain);
+    const bool has_gradient = s.gx * s.gx + s.gy * s.gy >= min_gradient * min_gradient;
     alignment.add(static_cast<double>(s.gx),
                   static_cast<double>(s.gy),
                   {static_cast<double>(s.nx), static_cast<double>(s.ny)},

@@ -39,7 +39,7 @@ std::optional<PlaneFit> fitInFrame(const Eigen::Matrix3d& M,
     const double s12 = M(1, 2) - k1 * k2 / d;
     const double s22 = M(2, 2) - k2 * k2 / d;
     const double half_sum = (s11 + s22) / 2, half_difference = (s11 - s22) / 2;
-    const double radius = std::hypot(half_difference, s12);
+    const double radius = std::sqrt(half_difference * half_difference + s12 * s12);
     const double mu = half_sum - radius;
     larger = half_sum + radius;
     // Eigenvector of mu, from the row that does not cancel.
@@ -48,7 +48,7 @@ std::optional<PlaneFit> fitInFrame(const Eigen::Matrix3d& M,
       v1 = radius - half_difference;
       v2 = -s12;
     }
-    const double length = std::hypot(v1, v2);
+    const double length = std::sqrt(v1 * v1 + v2 * v2);
     if (!(length > 0)) return std::nullopt;
     v1 /= length;
     v2 /= length;
@@ -56,7 +56,8 @@ std::optional<PlaneFit> fitInFrame(const Eigen::Matrix3d& M,
     n = {n0, v1, v2};
     const double step = (mu - lambda) / (1 + n0 * n0);
     const double previous = lambda;
-    lambda = std::max(0.0, lambda + step);
+    // The root lies below a; a step beyond it is cut in half.
+    lambda = lambda + step < a ? std::max(0.0, lambda + step) : (lambda + a) / 2;
     const double tolerance = 4 * std::numeric_limits<double>::epsilon() * larger;
     if (!(std::abs(lambda - previous) > tolerance)) break;
   }
@@ -89,10 +90,8 @@ std::optional<PlaneFit> fitInFrame(const Eigen::Matrix3d& M,
   return fit;
 }
 
-}  // namespace
-
-std::optional<PlaneFit> fitPlane(const RayMoments& moments) {
-  const Eigen::Matrix3d M = moments.matrix();
+/// M in a frame in which nothing is known of it; the columns of `frame` are that frame's axes.
+std::optional<PlaneFit> fitWithOwnAxis(const Eigen::Matrix3d& M, const Eigen::Matrix3d& frame) {
   const double trace = M.trace();
   if (!(trace > 0) || !std::isfinite(trace)) return std::nullopt;
   // Two steps of the power method from the largest column: within the plane, near the rays.
@@ -101,8 +100,14 @@ std::optional<PlaneFit> fitPlane(const RayMoments& moments) {
   Eigen::Vector3d axis = M.col(column) / trace;
   axis = (M * axis) / trace;
   if (!(axis.norm() > 0)) return std::nullopt;
-  const Eigen::Matrix3d frame = frameAround(axis.normalized());
-  return fitInFrame(frame.transpose() * M * frame, frame, 1e-13);
+  const Eigen::Matrix3d turned = frameAround(axis.normalized());
+  return fitInFrame(turned.transpose() * M * turned, frame * turned, 1e-13);
+}
+
+}  // namespace
+
+std::optional<PlaneFit> fitPlane(const RayMoments& moments) {
+  return fitWithOwnAxis(moments.matrix(), Eigen::Matrix3d::Identity());
 }
 
 std::optional<PlaneFit> fitPlane(std::span<const Eigen::Vector3d> rays) {
@@ -122,7 +127,10 @@ std::optional<PlaneFit> fitPlane(std::span<const Eigen::Vector3d> rays) {
     M += local * local.transpose();
   }
   if (!std::isfinite(M.trace())) return std::nullopt;
-  return fitInFrame(M, frame, 1e-18);
+  const auto fit = fitInFrame(M, frame, 1e-18);
+  if (fit && std::abs(fit->normal.dot(axis)) < 0.1) return fit;
+  // Rays far from any plane: the mean may lie anywhere.
+  return fitWithOwnAxis(M, frame);
 }
 
 }  // namespace dlsd

@@ -119,7 +119,8 @@ class RayTable {
   const double vv = sample.dv.squaredNorm();
   const double determinant = uu * vv - uv * uv;
   if (!(determinant > 0)) return 0;
-  return std::abs(f) * std::hypot(vv * gu - uv * gv, uu * gv - uv * gu) / determinant;
+  const double du = vv * gu - uv * gv, dv = uu * gv - uv * gu;
+  return std::abs(f) * std::sqrt(du * du + dv * dv) / determinant;
 }
 
 }  // namespace dlsd

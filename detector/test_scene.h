@@ -198,7 +198,7 @@ inline ImageView viewOf(const std::vector<uint8_t>& image, const Camera& camera)
           .stride_bytes = camera.width()};
 }
 
-/// A visible piece of a polygon's side; points every 0.5 px or less along its image.
+/// A visible piece of a polygon's side; points every 1 px or less along its image.
 struct Label {
   int carrier = 0;
   std::vector<Eigen::Vector2d> points;
@@ -213,7 +213,7 @@ inline std::vector<Label> labelsOf(const Scene& scene, const Camera& camera) {
   std::vector<Label> labels;
   std::vector<Label> curves;  // distractors
   int carrier = 0;
-  const double step_rad = 0.25 / 600;
+  const double step_rad = 0.002;  // at most 1 px
   const auto greyBeside = [&](const Eigen::Vector3d& ray, const Eigen::Vector3d& side) {
     return scene.greyOf(scene.shapeAt((ray + side * (1.5 / 300)).normalized()));
   };
@@ -282,11 +282,11 @@ inline std::vector<Label> labelsOf(const Scene& scene, const Camera& camera) {
     const Eigen::Vector2d ends[2] = {label.points.front(), label.points.back()};
     const auto keepClear = [&](const Label& other) {
       // Edges that meet a label's end are its corner: left out within 15 px of the meeting point.
-      for (size_t k = 0; k < other.points.size(); k += 4) {
+      for (size_t k = 0; k < other.points.size(); k += 2) {
         const Eigen::Vector2d& q = other.points[k];
         const bool near_end = (q - ends[0]).norm() < 15 || (q - ends[1]).norm() < 15;
         if (near_end) continue;
-        for (size_t j = 0; j < label.points.size(); j += 8) {
+        for (size_t j = 0; j < label.points.size(); j += 3) {
           label.clearance_px = std::min(label.clearance_px, (q - label.points[j]).norm());
         }
       }
@@ -325,7 +325,7 @@ inline double coverage(const Label& label,
   double best = 0;
   for (const auto& curve : detections) {
     size_t inside = 0, total = 0;
-    for (size_t i = skip; i + skip < label.points.size(); i += 2) {
+    for (size_t i = skip; i + skip < label.points.size(); ++i) {
       inside += distanceToPolyline(label.points[i], curve) <= rho_px ? 1 : 0;
       ++total;
     }
