@@ -206,7 +206,7 @@ Range drawRange() {
 TYPED_TEST(CameraSuite, PixelsInsideTheImageComeBack) {
   Worst worst("pixel -> ray -> pixel, in units of 1e-10 px");
   long seen = 0, drawn = 0;
-  const long cases = holds([&] {
+  holds([&] {
     const Camera camera = *genCamera<TypeParam>(Range::kRealistic);
     for (const Vector2d& pixel :
          many(rc::gen::oneOf(genPixelInImage(camera), genPixelOnBorder(camera)))) {
@@ -585,7 +585,7 @@ TYPED_TEST(CameraSuite, BatchesEqualSinglePoints) {
 TYPED_TEST(CameraSuite, KalibrFilesGiveBackTheSameCamera) {
   const std::string path = ::testing::TempDir() + "dlsd_camera_suite_" +
                            std::string(TypeParam::kName) + std::to_string(::getpid()) + ".yaml";
-  const long cases = holds([&] {
+  holds([&] {
     const Camera a = *genCamera<TypeParam>(drawRange());
     const Camera b = *genAnyCamera(Range::kAdmissible);
     saveCameras(path, {{"cam0", a}, {"cam1", b}});
