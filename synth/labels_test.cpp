@@ -36,7 +36,7 @@ class Oracle {
 
   [[nodiscard]] bool hidden(const Edge& edge, const Vector3d& point) const {
     const Vector3d d = point - eye_;
-    constexpr double kBefore = 1 - 1e-5;
+    constexpr double kBefore = 1 - 1e-8;
     for (const Corners& t : triangles_) {
       if (edge.source == EdgeSource::kRodCentre) {
         const Rod& rod = scene_.rods[static_cast<size_t>(edge.rod)];

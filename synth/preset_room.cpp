@@ -13,6 +13,7 @@
 #include "synth/presets.h"
 #include "synth/random.h"
 #include "synth/scene_builder.h"
+#include "synth/shading.h"
 
 namespace dlsd {
 namespace {
@@ -1006,11 +1007,25 @@ class RoomMaker {
       lamp.kind = Light::Kind::kPoint;
       lamp.place = {size_.x() * random_.next(0.2, 0.8),
                     size_.y() * random_.next(0.2, 0.8),
-                    size_.z() - random_.next(0.15, 0.6)};
+                    size_.z() - random_.next(0.4, 0.9)};
       lamp.strength = random_.next(0.3, 0.6);
       lamp.half_distance = random_.next(1.5, 4);
       scene.lights.push_back(lamp);
     }
+    // A photographer's exposure: the six faces of the room get this much light on average.
+    double mean = 0;
+    for (int k = 0; k < 3; ++k) {
+      for (const double side : {0.0, 1.0}) {
+        Vector3d point = size_ / 2, normal = Vector3d::Zero();
+        point[k] = side * size_[k];
+        normal[k] = 1 - 2 * side;
+        mean += irradiance(scene, point, normal) / 6;
+      }
+    }
+    const double scale = random_.next(0.75, 1.05) / mean;
+    scene.ambient_up *= scale;
+    scene.ambient_down *= scale;
+    for (Light& light : scene.lights) light.strength *= scale;
   }
 
   Pose makePose() {

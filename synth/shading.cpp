@@ -5,6 +5,23 @@
 
 namespace dlsd {
 
+double irradiance(const Scene& scene, const Eigen::Vector3d& point, const Eigen::Vector3d& normal) {
+  const double up = (1 + normal.z()) / 2;
+  double sum = up * scene.ambient_up + (1 - up) * scene.ambient_down;
+  for (const Light& light : scene.lights) {
+    if (light.kind == Light::Kind::kSun) {
+      sum += light.strength * std::max(0.0, normal.dot(light.place));
+    } else {
+      const Eigen::Vector3d to_light = light.place - point;
+      const double d2 = to_light.squaredNorm();
+      const double cosine = normal.dot(to_light) / std::sqrt(d2 + 1e-12);
+      sum += light.strength * std::max(0.0, cosine) /
+             (1 + d2 / (light.half_distance * light.half_distance));
+    }
+  }
+  return sum;
+}
+
 Shader::Shader(const Scene& scene) : scene_(&scene), grids_(scene.faces.size()) {
   for (size_t f = 0; f < scene.faces.size(); ++f) {
     const std::vector<Decal>& decals = scene.faces[f].decals;
@@ -63,23 +80,6 @@ int Shader::surfaceOfFace(int face, const Eigen::Vector3d& point) const {
   return f.surface;
 }
 
-double Shader::irradiance(const Eigen::Vector3d& point, const Eigen::Vector3d& normal) const {
-  const double up = (1 + normal.z()) / 2;
-  double sum = up * scene_->ambient_up + (1 - up) * scene_->ambient_down;
-  for (const Light& light : scene_->lights) {
-    if (light.kind == Light::Kind::kSun) {
-      sum += light.strength * std::max(0.0, normal.dot(light.place));
-    } else {
-      const Eigen::Vector3d to_light = light.place - point;
-      const double d2 = to_light.squaredNorm();
-      const double cosine = normal.dot(to_light) / std::sqrt(d2 + 1e-12);
-      sum += light.strength * std::max(0.0, cosine) /
-             (1 + d2 / (light.half_distance * light.half_distance));
-    }
-  }
-  return sum;
-}
-
 Eigen::Vector3d Shader::pointOnFace(const Hit& hit,
                                     const Eigen::Vector3d& origin,
                                     const Eigen::Vector3d& direction) const {
@@ -127,7 +127,7 @@ float Shader::radiance(const Hit& hit,
     if (normal.dot(direction) > 0) normal = -normal;
   }
   const Surface& s = scene_->surfaces[static_cast<size_t>(surface)];
-  return static_cast<float>(s.albedo * irradiance(point, normal) + s.emission);
+  return static_cast<float>(s.albedo * irradiance(*scene_, point, normal) + s.emission);
 }
 
 }  // namespace dlsd

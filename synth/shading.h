@@ -15,6 +15,12 @@ struct Seen {
   float radiance = 0;  ///< Linear light; 1 is white at exposure 1.
 };
 
+/// Irradiance over pi at a point of a surface with this unit normal (world frame): a white
+/// surface's radiance.
+[[nodiscard]] double irradiance(const Scene& scene,
+                                const Eigen::Vector3d& point,
+                                const Eigen::Vector3d& normal);
+
 /// Immutable; may be used by many threads. The scene must outlive it.
 class Shader {
  public:
@@ -50,8 +56,6 @@ class Shader {
                                             const Eigen::Vector3d& origin,
                                             const Eigen::Vector3d& direction) const;
   [[nodiscard]] int surfaceOfFace(int face, const Eigen::Vector3d& point) const;
-  [[nodiscard]] double irradiance(const Eigen::Vector3d& point,
-                                  const Eigen::Vector3d& normal) const;
 
   const Scene* scene_;
   std::vector<DecalGrid> grids_;  ///< One per face; empty for faces without decals.
