@@ -17,10 +17,19 @@ using Eigen::Vector3d;
 
 constexpr uint64_t kStream = 0x901a;
 
-/// A solid inside the unit sphere.
 struct Shape {
   std::vector<Vector3d> vertices;
   std::vector<std::vector<int>> loops;
+
+  /// Moves and scales it so that its bounding box fits the unit sphere.
+  void fitUnitSphere() {
+    Vector3d lo = vertices.front(), hi = lo;
+    for (const Vector3d& v : vertices) {
+      lo = lo.cwiseMin(v);
+      hi = hi.cwiseMax(v);
+    }
+    for (Vector3d& v : vertices) v = (2 * v - lo - hi) / (hi - lo).norm();
+  }
 };
 
 /// Prism over a polygon (counter-clockwise from +z), which is seen whole from its first corner.
@@ -108,21 +117,21 @@ struct Cone {
 SceneView makePolyhedra(uint64_t seed, uint64_t index) {
   Random random(hashCounters({seed, index}), kStream);
   SceneBuilder builder;
-  const Vector3d hall(60, 60, 40);
+  const Vector3d hall(16, 16, 16);
   std::array<Panel, 4> walls;
   const double sky = random.next(0.15, 0.9);
   for (Panel& wall : walls) wall.surface = {sky * random.next(0.8, 1.2), 0};
   builder.addRoom(hall, walls, {random.next(0.1, 0.6), 0}, {sky * random.next(0.8, 1.2), 0});
 
-  const Vector3d eye =
-      roundToFloat(hall / 2 + Vector3d{random.next(-3, 3), random.next(-3, 3), random.next(-3, 3)});
+  const Vector3d eye = roundToFloat(
+      hall / 2 + Vector3d{random.next(-0.4, 0.4), random.next(-0.4, 0.4), random.next(-0.4, 0.4)});
   std::vector<Cone> cones;
   constexpr int kTries = 60;
   for (int k = 0; k < kTries; ++k) {
     // Every try takes the same number of draws up to here, whether it finds a place or not.
     Random own(random.bits(static_cast<uint64_t>(1000 + k)), kStream);
     Cone cone{drawDirection(&own), own.next(4, 18) * M_PI / 180, 0, 0};
-    const double distance = own.next(1.5, 9);
+    const double distance = own.next(1, 5.5);
     const double radius = distance * std::sin(cone.angle_rad);
     cone.near_m = distance - radius;
     cone.far_m = distance + radius;
@@ -139,15 +148,15 @@ SceneView makePolyhedra(uint64_t seed, uint64_t index) {
     cones.push_back(cone);
 
     Shape shape = drawShape(&own);
-    const Eigen::Matrix3d turn = drawRotation(&own);
-    const Vector3d centre = eye + cone.direction * distance;
-    for (Vector3d& v : shape.vertices) v = centre + radius * (turn * v);
+    shape.fitUnitSphere();
+    for (Vector3d& v : shape.vertices) v *= radius;
+    const Frame3 frame{eye + cone.direction * distance, drawRotation(&own)};
     const double albedo = own.next(0.15, 0.85);
     std::vector<Surface> surfaces;
     for (size_t i = 0; i < shape.loops.size(); ++i) {
       surfaces.push_back({std::clamp(albedo * own.next(0.5, 1.5), 0.03, 0.95), 0});
     }
-    builder.addSolid(shape.vertices, shape.loops, surfaces);
+    builder.addSolid(frame, shape.vertices, shape.loops, surfaces);
   }
   builder.finish();
 

@@ -222,13 +222,14 @@ SlabFaces SceneBuilder::addBox(const Frame3& frame,
   return addBox(frame, lo, hi, Panel{surface, {}}, surface);
 }
 
-void SceneBuilder::addSolid(const std::vector<Eigen::Vector3d>& vertices,
+void SceneBuilder::addSolid(const Frame3& frame,
+                            const std::vector<Eigen::Vector3d>& vertices,
                             const std::vector<std::vector<int>>& loops,
                             const std::vector<Surface>& surfaces) {
   Eigen::Vector3d lo = vertices.front(), hi = lo;
   std::vector<int> index;
   for (const Eigen::Vector3d& v : vertices) {
-    index.push_back(addVertex(v));
+    index.push_back(addVertex(frame.at(v.x(), v.y(), v.z())));
     lo = lo.cwiseMin(v);
     hi = hi.cwiseMax(v);
   }
@@ -247,7 +248,9 @@ void SceneBuilder::addSolid(const std::vector<Eigen::Vector3d>& vertices,
       if (!is_first) addEdge(it->first.first, it->first.second, it->second, face);
     }
   }
-  scene.pieces.push_back({(lo + hi) / 2, Eigen::Matrix3d::Identity(), (hi - lo) / 2, solid_++});
+  const Eigen::Vector3d middle = (lo + hi) / 2;
+  scene.pieces.push_back(
+      {frame.at(middle.x(), middle.y(), middle.z()), frame.axes, (hi - lo) / 2, solid_++});
 }
 
 void SceneBuilder::addRod(const Eigen::Vector3d& from,

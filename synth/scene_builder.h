@@ -81,9 +81,11 @@ class SceneBuilder {
                    const Panel& front,
                    const Surface& sides);
 
-  /// A solid bounded by planar polygons. Each loop lists vertices counter-clockwise as seen from
-  /// outside, starting with one from which the whole polygon is seen; each edge is in two loops.
-  void addSolid(const std::vector<Eigen::Vector3d>& vertices,
+  /// A solid bounded by planar polygons, vertices in the frame. Each loop lists vertices
+  /// counter-clockwise as seen from outside, starting with one from which the whole polygon is
+  /// seen; each edge is in two loops.
+  void addSolid(const Frame3& frame,
+                const std::vector<Eigen::Vector3d>& vertices,
                 const std::vector<std::vector<int>>& loops,
                 const std::vector<Surface>& surfaces);
 

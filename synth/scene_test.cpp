@@ -27,6 +27,7 @@ std::vector<Named> scenes() {
   }
   for (uint64_t seed = 0; seed < 5; ++seed) {
     out.push_back({"paper " + std::to_string(seed), makeSceneView("paper", seed, 3)});
+    out.push_back({"polyhedra " + std::to_string(seed), makeSceneView("polyhedra", seed, 3)});
   }
   return out;
 }
@@ -91,7 +92,7 @@ TEST(Random, KeepsIntegerRange) {
 }
 
 TEST(Scene, IsAFunctionOfSeedAndIndex) {
-  for (const char* preset : {"room", "paper"}) {
+  for (const std::string& preset : scenePresets()) {
     const SceneView a = makeSceneView(preset, 5, 3), b = makeSceneView(preset, 5, 3);
     EXPECT_TRUE(sameBits(a.scene, b.scene));
     EXPECT_EQ(a.pose.cam_from_world, b.pose.cam_from_world);
