@@ -36,8 +36,7 @@ namespace {
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-// --- Tolerances, all in one place
-// ---------------------------------------------------------------------
+// --- Tolerances, all in one place ---
 
 /// pixel -> ray -> pixel inside the image, px.
 constexpr double kPixelRoundTrip = 1e-10;
@@ -52,8 +51,7 @@ constexpr double kBand = 1e-12;
 /// Number of rays or pixels drawn for each camera.
 constexpr size_t kMany = 64;
 
-// --- Helpers
-// ------------------------------------------------------------------------------------------
+// --- Helpers ---
 
 double ulp(double x) {
   x = std::abs(x);
@@ -200,8 +198,7 @@ Range drawRange() {
   return kind == 2 ? Range::kAdmissible : Range::kRealistic;
 }
 
-// --- Round trips
-// --------------------------------------------------------------------------------------
+// --- Round trips ---
 
 TYPED_TEST(CameraSuite, PixelsInsideTheImageComeBack) {
   Worst worst("pixel -> ray -> pixel, in units of 1e-10 px");
@@ -261,8 +258,7 @@ TYPED_TEST(CameraSuite, RaysComeBack) {
   EXPECT_GT(worst_far.count(), cases * 5);
 }
 
-// --- Validity
-// -----------------------------------------------------------------------------------------
+// --- Validity ---
 
 TYPED_TEST(CameraSuite, ValidOneWayImpliesValidBack) {
   long rays = 0, pixels = 0;
@@ -430,8 +426,7 @@ TYPED_TEST(CameraSuite, TheLengthOfARayDoesNotMatter) {
   EXPECT_GT(worst.count(), cases * 10);
 }
 
-// --- Right
-// --------------------------------------------------------------------------------------------
+// --- Right ---
 
 TYPED_TEST(CameraSuite, AgreesWithTheTextbookInLongDouble) {
   Worst worst("difference, in units of 8 ulp(px) + largest singular value * ray resolution");
@@ -544,8 +539,7 @@ TYPED_TEST(CameraSuite, TheImageIsContinuousAcrossTheAxis) {
   EXPECT_GT(worst.count(), cases * 25);
 }
 
-// --- Batches, files, arcs
-// -----------------------------------------------------------------------------
+// --- Batches, files, arcs ---
 
 TYPED_TEST(CameraSuite, BatchesEqualSinglePoints) {
   long compared = 0;
@@ -729,8 +723,19 @@ TYPED_TEST(CameraSuite, SpansAreThoseOfADenseSampling) {
             << ", ends at the rim " << rims << "\n";
 }
 
-// --- OpenCV
-// -------------------------------------------------------------------------------------------
+TYPED_TEST(CameraSuite, TheDocumentedParametersAreThose) {
+  const std::string docs = readFile(std::string(DLSD_SOURCE_DIR) + "/docs/cameras.md");
+  for (const ParamSpec& spec : TypeParam::kParams) {
+    std::ostringstream row;
+    row << "| " << TypeParam::kName << " | " << spec.name << " | " << spec.unit << " | " << spec.min
+        << " ... " << spec.max << " | " << spec.realistic_min << " ... " << spec.realistic_max
+        << " |";
+    EXPECT_NE(docs.find(row.str()), std::string::npos) << "docs/cameras.md lacks the row\n"
+                                                       << row.str();
+  }
+}
+
+// --- OpenCV ---
 
 /// Rays of an image's pixels within an angle of the axis, as OpenCV points.
 #if defined(DLSD_HAVE_CALIB3D) || defined(DLSD_HAVE_CCALIB)
