@@ -12,8 +12,8 @@ namespace dlsd {
 /// For z > 0 this is the textbook form r_d = atan(2 tan(omega / 2) r / z) / omega. omega = 0 is the
 /// pinhole, to which the model converges.
 ///
-/// Domain: alpha < pi, that is every ray but -z; pixels with r_d omega < pi. For omega <
-/// kPinholeOmega (relative difference to the limit below 1e-19): z > 0, every pixel.
+/// Domain: every ray but -z, and pixels with r_d omega < pi. For omega < kPinholeOmega, where the
+/// two models differ by less than 1e-18 (r / z)^2 relative: z > 0, every pixel.
 struct Fov {
   static constexpr std::string_view kName = "fov";
   static constexpr double kPinholeOmega = 1e-9;
