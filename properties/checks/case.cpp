@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <stdexcept>
-#include <utility>
 
 #include "cameras/calibration/files.h"
 #include "synth/dataset/json_fields.h"
@@ -12,19 +11,6 @@ namespace dlsd {
 namespace {
 
 using nlohmann::ordered_json;
-
-/// The parameter table of a model by its name; empty if there is no such model.
-std::span<const ParamSpec> paramSpecsOf(std::string_view model_name) {
-  std::span<const ParamSpec> specs;
-  const auto find = [&]<size_t... I>(std::index_sequence<I...>) {
-    ((std::variant_alternative_t<I, CameraModelVariant>::kName == model_name
-          ? void(specs = std::variant_alternative_t<I, CameraModelVariant>::kParams)
-          : void()),
-     ...);
-  };
-  find(std::make_index_sequence<std::variant_size_v<CameraModelVariant>>());
-  return specs;
-}
 
 ordered_json cameraToJson(const Camera& camera) {
   ordered_json params;
@@ -41,11 +27,11 @@ ordered_json cameraToJson(const Camera& camera) {
 
 Camera cameraFromJson(const JsonField& json) {
   const std::string model = json["model"].text();
-  std::vector<double> values;
-  for (const ParamSpec& spec : paramSpecsOf(model)) {
-    values.push_back(json["params"][std::string(spec.name).c_str()].number());
-  }
   try {
+    std::vector<double> values;
+    for (const ParamSpec& spec : paramSpecsOf(model)) {
+      values.push_back(json["params"][std::string(spec.name).c_str()].number());
+    }
     return makeCamera(model,
                       values,
                       json["width"].integer(1, 65535),
