@@ -121,8 +121,9 @@ class Events {
       const double ratio = std::sqrt((1 - sine) * (1 + sine)) / std::hypot(x, y);
       if (ratio <= 1) {
         const double at = std::atan2(y, x), half = std::acos(ratio);
-        addPhi(at - half);
-        addPhi(at + half);
+        // Back into [-pi, pi], where the arc is [0, angle].
+        addPhi(std::remainder(at - half, 2 * M_PI));
+        addPhi(std::remainder(at + half, 2 * M_PI));
       }
     }
     // Where the edge itself goes into the sphere (a rod into its node).

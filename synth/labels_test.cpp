@@ -187,6 +187,52 @@ TEST(VisibleSpans, EndWhereBruteForceSaysSo) {
   EXPECT_GE(static_cast<double>(exact), 0.99 * static_cast<double>(ends));
 }
 
+// A rod all across the view, almost a half circle, behind a ball near one of its far ends: one of
+// the ball's two outline angles is beyond -180 degrees.
+TEST(VisibleSpans, EndBehindBallsNearTheFarEndOfLongArcs) {
+  const std::array<double, 8> params{100, 100, 319.5, 319.5, 0, 0, 0, 0};
+  const Camera camera = makeCamera("kannala_brandt", params, 640, 640);
+  size_t tested = 0, hidden = 0;
+  for (const double side : {-1.0, 1.0}) {
+    for (const double height : {0.25, 0.05, -0.1, -0.25}) {
+      SceneBuilder builder;
+      builder.addRod({-20, 0, 1}, {20, 0, 1}, 0.001, 4, {0, 0.2});
+      builder.addSphere({side, 0, height}, 0.3, {0.5, 0});
+      builder.finish();
+      const Scene scene = std::move(builder.scene);
+      const Raycaster raycaster(scene);
+      const Oracle oracle(scene, Vector3d::Zero());
+      const auto spans = visibleSpans(scene, raycaster, camera, Pose{});
+      for (size_t e = 0; e < scene.edges.size(); ++e) {
+        const Edge& edge = scene.edges[e];
+        if (edge.source != EdgeSource::kRodCentre) continue;
+        const double angle = angleTo(edge.from, edge.to);
+        ASSERT_GT(angle, 174 * M_PI / 180);
+        constexpr int kPoints = 2000;
+        for (int k = 1; k < kPoints; ++k) {
+          // Evenly in angle: the rod is 1 m ahead.
+          const double phi = angle * k / kPoints;
+          const Vector3d point(std::tan(phi - angle / 2), 0, 1);
+          bool found = false, at_end = false;
+          for (const EdgeSpan& s : spans) {
+            if (s.edge != static_cast<int>(e)) continue;
+            found = found || (phi >= s.phi0 && phi <= s.phi1);
+            at_end = at_end || std::min(std::abs(phi - s.phi0), std::abs(phi - s.phi1)) < 1e-6;
+          }
+          if (at_end) continue;
+          ++tested;
+          const bool expected = !oracle.hidden(edge, point);
+          hidden += expected ? 0U : 1U;
+          ASSERT_EQ(found, expected) << "ball at " << side << ", " << height << "; "
+                                     << phi * 180 / M_PI << " of " << angle * 180 / M_PI << " deg";
+        }
+      }
+    }
+  }
+  EXPECT_GT(tested, 15000U);
+  EXPECT_GT(hidden, 500U);
+}
+
 struct Made {
   SceneView view;
   Labels labels;
