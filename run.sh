@@ -9,9 +9,9 @@ source scripts/packages.sh
 
 need_packages "${build_packages[@]}"
 # Without tests on a first run; a build folder that test.sh has configured stays as it is.
-if [[ ! -f build/release/CMakeCache.txt ]]; then configure_once release DLSD_TESTS=OFF; fi
+if [[ ! -f build/release/build.ninja ]]; then configure release DLSD_TESTS=OFF; fi
 echo "Building (first time: a few minutes) ..."
-cmake --build --preset release --target dlsd_cli | tail -n 1
+build release --target dlsd_cli
 dlsd=build/release/cli/dlsd
 
 cameras=()

@@ -6,6 +6,7 @@ cd "$(dirname "$0")"
 source scripts/packages.sh
 
 need_packages "${build_packages[@]}" "${test_packages[@]}"
-configure_once release DLSD_TESTS=ON
-cmake --build --preset release
+if ! configured release DLSD_TESTS=ON; then configure release DLSD_TESTS=ON; fi
+echo "Building (first time: a few minutes) ..."
+build release
 ctest --preset quick -j"$(nproc)" "$@"

@@ -23,7 +23,7 @@ need_packages() {
   [[ ${#missing[@]} -eq 0 ]] && return
   if [[ $(id -u) -ne 0 ]]; then
     echo "Packages are missing. Please run this once, then start $0 again:" >&2
-    echo "  sudo apt-get install --no-install-recommends ${missing[*]}" >&2
+    echo "  sudo apt-get update && sudo apt-get install --no-install-recommends ${missing[*]}" >&2
     exit 3
   fi
   echo "Installing ${#missing[@]} packages: ${missing[*]}"
@@ -38,17 +38,36 @@ need_packages() {
   rm -f "$log"
 }
 
-# configure_once PRESET [OPTION...]: a configured build folder is left as it is, so that run.sh and
-# test.sh share one build. Options given must hold already, else it is configured again.
-configure_once() {
-  local preset=$1 cache option
-  shift
-  cache=build/$preset/CMakeCache.txt
-  local fresh=1
-  [[ -f $cache && -f build/$preset/build.ninja ]] || fresh=0
-  for option in "$@"; do
-    [[ $fresh -eq 1 ]] && grep -q "^${option%%=*}:[A-Z]*=${option#*=}$" "$cache" || fresh=0
+# configured PRESET OPTION=VALUE...: whether the build folder is there and has these options.
+configured() {
+  local cache=build/$1/CMakeCache.txt option
+  [[ -f build/$1/build.ninja ]] || return 1
+  for option in "${@:2}"; do
+    grep -q "^${option%%=*}:[A-Z]*=${option#*=}$" "$cache" || return 1
   done
-  [[ $fresh -eq 1 ]] && return
-  cmake --preset "$preset" "${@/#/-D}" >/dev/null
 }
+
+# quietly COMMAND...: runs it; where nobody watches, its output is shown only if it fails.
+quietly() {
+  if [[ -t 1 ]]; then
+    "$@"
+    return
+  fi
+  local log
+  log=$(mktemp)
+  if ! "$@" >"$log" 2>&1; then
+    cat "$log" >&2
+    rm -f "$log"
+    return 1
+  fi
+  rm -f "$log"
+}
+
+# configure PRESET OPTION=VALUE...
+configure() {
+  local options=("${@:2}")
+  quietly cmake --preset "$1" "${options[@]/#/-D}"
+}
+
+# build PRESET ARGUMENT...
+build() { quietly cmake --build --preset "$@"; }

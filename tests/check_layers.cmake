@@ -1,4 +1,4 @@
-# Fails on an include against the direction of dependency (docs: README "Layout"; the map's section 1).
+# Fails on an include against the direction of dependency (README, "Layout").
 #   cmake -DROOT=<source tree> -P check_layers.cmake
 #
 # A rule: files whose path matches FILES must not include what matches FORBIDDEN, except files that

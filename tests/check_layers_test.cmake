@@ -1,5 +1,4 @@
 # Breaks each rule of check_layers.cmake once, in a small tree of its own, and demands that it is found.
-set(count 0)
 function(expect_violation file include)
   file(REMOVE_RECURSE ${WORK})
   file(WRITE ${WORK}/${file} "#include ${include}\n")
