@@ -128,7 +128,7 @@ class RoomMaker {
       const Frame3 f = SceneBuilder::wallFrame(size_, w.wall);
       // Nothing tall in front of a window.
       taken_.push_back(boxIn(f, {pocket.x0, pocket.y0, 0}, {pocket.x1, pocket.y1, 0.45}));
-      if (random_.nextBool(0.12)) addBlind(f, pocket);
+      if (random_.nextBool(0.2)) addBlind(f, pocket);
       if (random_.nextBool(0.4)) addRadiator(f, pocket);
     }
     addDoor(door_wall);
@@ -284,13 +284,29 @@ class RoomMaker {
     front.pockets.push_back(leaf);
     Frame3 f = frame;
     f.origin = frame.at(door_lo_, 0, proud);
-    builder_.addSlab(f, width, height, proud, front, front.surface, true);
+    const SlabFaces slab = builder_.addSlab(f, width, height, proud, front, front.surface, true);
+    if (random_.nextBool(0.6)) {
+      const Surface line = near(leaf.bottom.surface, 0.5);
+      for (const PanelFaces& panel : slab.front.pockets[0].pockets) {
+        addMoulding(panel.front, {w, h}, line, near(leaf.bottom.surface, 0.25));
+      }
+    }
     // The handle, on the rail beside the panels.
     Frame3 handle = frame;
     handle.origin = frame.at(door_lo_ + leaf.x0 + 0.03, 1.02, proud - leaf.depth + 0.03);
     const Surface metal = paint(0.3, 0.8);
     builder_.addSlab(handle, 0.05, 0.02, 0.03, plain(metal), metal);
     taken_.push_back(boxIn(frame, {door_lo_, 0, 0}, {door_hi_, height, 0.8}));
+  }
+
+  /// A painted line along the border of a leaf or panel [0, size].
+  void addMoulding(int face, const Vector2d& size, const Surface& line, const Surface& inside) {
+    constexpr double kInset = 0.022, kLine = 0.012;
+    const Vector2d half = size / 2;
+    if (half.minCoeff() < 2 * (kInset + kLine)) return;
+    builder_.addDecal(face, {DecalShape::kRectangle, half, half.array() - kInset, 0, line});
+    builder_.addDecal(face,
+                      {DecalShape::kRectangle, half, half.array() - kInset - kLine, 0, inside});
   }
 
   void addSkirting(int door_wall) {
@@ -314,14 +330,18 @@ class RoomMaker {
     }
   }
 
-  /// Stripes, a chequered floor or tiles with joints, as prints.
+  /// Stripes, a chequered floor, planks or tiles with joints, as prints.
   void addFloorPattern() {
     const double kind = random_.next(0, 1);
-    if (kind < 0.45) return;
+    if (kind < 0.4) return;
     plain_floor_ = false;
+    if (kind > 0.85) {
+      addPlanks();
+      return;
+    }
     constexpr double kMarginToWall = 0.05;
     const Vector2d area(size_.x() - 2 * kMarginToWall, size_.y() - 2 * kMarginToWall);
-    const bool tiles = kind > 0.9, stripes = kind < 0.68;
+    const bool tiles = kind > 0.72, stripes = kind < 0.55;
     const double wanted = random_.next(0.4, 0.85);
     const double joint = tiles ? random_.next(0.008, 0.02) : 0;
     const int rows = static_cast<int>(area.y() / (stripes ? 0.7 * wanted : wanted));
@@ -341,6 +361,31 @@ class RoomMaker {
              (cell.array() - joint) / 2,
              0,
              near(tile, 0.08)});
+      }
+    }
+  }
+
+  /// Boards along x with dark joints, their ends staggered from row to row.
+  void addPlanks() {
+    constexpr double kMarginToWall = 0.03;
+    const Vector2d area(size_.x() - 2 * kMarginToWall, size_.y() - 2 * kMarginToWall);
+    const int rows = static_cast<int>(area.y() / random_.next(0.14, 0.24));
+    const double width = area.y() / rows, joint = random_.next(0.004, 0.008);
+    const double longest = random_.next(1.8, 3.2);
+    for (int j = 0; j < rows; ++j) {
+      double x = 0;
+      while (x < area.x()) {
+        double end = x + (x > 0 ? longest : longest * random_.next(0.3, 1));
+        if (end > area.x() - 0.3) end = area.x();
+        const Vector2d centre((x + end) / 2, (j + 0.5) * width);
+        const Vector2d half((end - x - joint) / 2, (width - joint) / 2);
+        builder_.addDecal(floor_,
+                          {DecalShape::kRectangle,
+                           centre.array() + kMarginToWall,
+                           half,
+                           0,
+                           {std::min(0.7, floor_paint_.albedo * random_.next(1.2, 1.6)), 0}});
+        x = end;
       }
     }
   }
@@ -527,7 +572,12 @@ class RoomMaker {
             {x, x + w, z, z + h, depth, near(body, 0.1), plain(near(body, 0.3))});
       }
     }
-    builder_.addBox(*f, {0, 0, 0}, size, front, body);
+    const SlabFaces box = builder_.addBox(*f, {0, 0, 0}, size, front, body);
+    if (random_.nextBool(0.5)) {
+      const Surface line = near(body, 0.5), inside = near(body, 0.3);
+      for (const PanelFaces& leaf : box.front.pockets)
+        addMoulding(leaf.front, {w, h}, line, inside);
+    }
     const Surface metal = paint(0.1, 0.8);
     for (const Pocket& p : front.pockets) {
       // A bar handle on the leaf, in touch with it.
@@ -554,7 +604,7 @@ class RoomMaker {
         // A stack, each one inside the one below.
         double inset = 0, level = z;
         const int count = random_.nextInt(2, 4);
-        for (int i = 0; i < count; ++i) {
+        for (int i = 0; i < count && d - 2 * inset > 0.03; ++i) {
           const double thick = random_.next(0.015, 0.05);
           const Surface cover = anyPaint();
           builder_.addBox(f,
@@ -867,7 +917,8 @@ class RoomMaker {
   /// A framed picture, its canvas recessed or flush.
   void addPicture(int wall) {
     const double w = random_.next(0.35, 1.2), h = w * random_.next(0.6, 1.4);
-    const double thick = random_.next(0.01, 0.03), rim = random_.next(0.03, 0.1);
+    const double thick = random_.next(0.01, 0.03);
+    const double rim = std::min(random_.next(0.03, 0.1), 0.2 * h);
     if (h > 1.1) return;
     const auto at = placeOnWall(wall, w, h, thick, 0.9, size_.z() - h - 0.2);
     if (!at) return;
@@ -885,7 +936,18 @@ class RoomMaker {
     const SlabFaces faces = builder_.addSlab(f, w, h, thick, front, front.surface);
     const Vector2d centre(w / 2, h / 2);
     builder_.addDecal(faces.front.front, {DecalShape::kRectangle, centre, inner, 0, anyPaint()});
+    if (random_.nextBool(0.7)) {
+      addBorderLine(faces.front.front, centre, inner.array() - 0.05 * inner.minCoeff());
+    }
     addPrint(faces.front.front, centre, inner * 0.85);
+  }
+
+  /// A rectangle with a line of a few millimetres around it, nested in whatever is there.
+  void addBorderLine(int face, const Vector2d& centre, const Vector2d& half) {
+    const double line = half.minCoeff() * random_.next(0.02, 0.05);
+    const Surface paint_inside = anyPaint();
+    builder_.addDecal(face, {DecalShape::kRectangle, centre, half, 0, anyPaint()});
+    builder_.addDecal(face, {DecalShape::kRectangle, centre, half.array() - line, 0, paint_inside});
   }
 
   /// Abstract art: cells of a coarse grid, each with a shape.
@@ -929,6 +991,10 @@ class RoomMaker {
     const Vector2d centre = *at + Vector2d(w / 2, h / 2);
     const int face = wall_faces_[static_cast<size_t>(wall)];
     builder_.addDecal(face, {DecalShape::kRectangle, centre, {w / 2, h / 2}, 0, anyPaint()});
+    if (random_.nextBool(0.6)) {
+      const double margin = 0.02 * std::min(w, h);
+      addBorderLine(face, centre, {w / 2 - margin, h / 2 - margin});
+    }
     addPrint(face, centre, Vector2d(w, h) * 0.44);
   }
 

@@ -199,6 +199,7 @@ TEST(Scene, SolidsDoNotEnterEachOther) {
     const auto& pieces = s.view.scene.pieces;
     ASSERT_GT(pieces.size(), 10U);
     for (size_t i = 0; i < pieces.size(); ++i) {
+      EXPECT_GT(pieces[i].half.minCoeff(), 0) << s.name << " piece " << i << " is inside out";
       for (size_t j = i + 1; j < pieces.size(); ++j) {
         const double reach = pieces[i].half.norm() + pieces[j].half.norm();
         if ((pieces[i].centre - pieces[j].centre).norm() > reach) continue;
