@@ -10,6 +10,7 @@
 #include <cstdio>
 #include <deque>
 #include <filesystem>
+#include <fstream>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -238,6 +239,114 @@ bool fileHas(const std::string& path, const std::string& sha256) {
   return fs::is_regular_file(path, error) && sha256Hex(readFile(path)) == sha256;
 }
 
+constexpr std::string_view kJournalFormat = "dlsd-journal/1";
+
+std::string journalName(int shard_index, int shard_count) {
+  if (shard_count == 1) return "journal.txt";
+  return "journal-" + std::to_string(shard_index) + "-of-" + std::to_string(shard_count) + ".txt";
+}
+
+bool isJournal(const std::string& name) {
+  return name.starts_with("journal") && name.ends_with(".txt");
+}
+
+std::string journalLine(uint64_t index, const FrameHashes& hashes) {
+  return std::to_string(index) + ' ' + hashes.image + ' ' + hashes.labels + '\n';
+}
+
+/// What unfinished runs have made: one line per frame whose files are in place.
+class Journal {
+ public:
+  /// Reads all journals of the folder; throws InputError if one is of another configuration.
+  Journal(const std::string& folder, const std::string& own_name, const ordered_json& config)
+      : path_(folder + "/" + own_name),
+        head_(std::string(kJournalFormat) + ' ' + sha256Hex(std::string(kVersion) + config.dump()) +
+              '\n') {
+    std::error_code error;
+    for (const auto& entry : fs::directory_iterator(folder, error)) {
+      const std::string name = entry.path().filename().string();
+      if (!isJournal(name)) continue;
+      const std::string text = readFile(folder + "/" + name);
+      if (!text.starts_with(head_)) {
+        throw InputError(folder + " holds an unfinished dataset of another configuration (" + name +
+                         "): choose another folder or delete it");
+      }
+      std::map<uint64_t, FrameHashes> frames = framesIn(text.substr(head_.size()));
+      if (name == own_name) own_ = frames;
+      known_.merge(frames);
+    }
+  }
+
+  [[nodiscard]] const std::map<uint64_t, FrameHashes>& known() const { return known_; }
+
+  /// Call when both files of the frame are in place.
+  void add(uint64_t index, const FrameHashes& hashes) {
+    if (!file_.is_open()) {
+      // Written anew from what could be read, so that a torn line does not stay in the middle.
+      std::string text = head_;
+      for (const auto& [i, h] : own_) text += journalLine(i, h);
+      writeFileAtomically(path_, text);
+      file_.open(path_, std::ios::binary | std::ios::app);
+    }
+    file_ << journalLine(index, hashes) << std::flush;
+    if (!file_) throw SystemError(path_ + ": cannot be written");
+  }
+
+  void remove() {
+    file_.close();
+    std::error_code error;
+    fs::remove(path_, error);
+  }
+
+ private:
+  /// Lines that are complete; the last one may be torn.
+  static std::map<uint64_t, FrameHashes> framesIn(const std::string& text) {
+    std::map<uint64_t, FrameHashes> frames;
+    for (size_t begin = 0, end; (end = text.find('\n', begin)) != std::string::npos;
+         begin = end + 1) {
+      std::istringstream line(text.substr(begin, end - begin));
+      uint64_t index = 0;
+      FrameHashes hashes;
+      if (line >> index >> hashes.image >> hashes.labels && hashes.image.size() == 64 &&
+          hashes.labels.size() == 64) {
+        frames[index] = hashes;
+      }
+    }
+    return frames;
+  }
+
+  std::string path_, head_;
+  std::map<uint64_t, FrameHashes> known_, own_;
+  std::ofstream file_;
+};
+
+/// Removes what a killed run left half written of this shard's frames.
+void removeTemporaryFiles(const GenerateOptions& options) {
+  for (const char* folder : {"images", "labels"}) {
+    std::error_code error;
+    std::vector<fs::path> leftovers;
+    for (const auto& entry : fs::directory_iterator(options.out + "/" + folder, error)) {
+      const std::string name = entry.path().filename().string();
+      const size_t digits = name.find_first_not_of("0123456789");
+      if (digits == 0 || digits > 9 || name.find(".tmp-") == std::string::npos) continue;
+      if (std::stoi(name.substr(0, digits)) % options.shard_count == options.shard_index) {
+        leftovers.push_back(entry.path());
+      }
+    }
+    for (const fs::path& path : leftovers) fs::remove(path, error);
+  }
+}
+
+/// The dataset is complete: no journal is needed any more, whoever wrote it.
+void removeJournals(const std::string& folder) {
+  std::error_code error;
+  std::vector<fs::path> journals;
+  for (const auto& entry : fs::directory_iterator(folder, error)) {
+    if (isJournal(entry.path().filename().string())) journals.push_back(entry.path());
+  }
+  for (const fs::path& path : journals) fs::remove(path, error);
+}
+
 }  // namespace
 
 void GenerateOptions::check() const {
@@ -274,12 +383,14 @@ GenerateResult generateDataset(const GenerateOptions& options,
   const ordered_json config = configJson(options);
   const std::string own_name = manifestName(options.shard_index, options.shard_count);
   std::map<std::string, Manifest> earlier = readManifests(options.out, config);
+  Journal journal(options.out, journalName(options.shard_index, options.shard_count), config);
 
   Manifest manifest;
   manifest.config = config;
   for (const char* folder : {"images", "labels", "cameras"}) {
     makeFolders(options.out + "/" + folder);
   }
+  removeTemporaryFiles(options);
   for (const auto& [name, camera] : options.cameras) {
     const std::string text = kalibrYaml({{"cam0", camera}});
     const std::string path = options.out + "/" + cameraPath(name);
@@ -290,7 +401,7 @@ GenerateResult generateDataset(const GenerateOptions& options,
   for (int i = options.shard_index; i < options.count; i += options.shard_count) {
     manifest.frames.push_back({static_cast<uint64_t>(i), {}});
   }
-  std::map<uint64_t, FrameHashes> known;
+  std::map<uint64_t, FrameHashes> known = journal.known();
   for (const auto& [name, old] : earlier) known.insert(old.frames.begin(), old.frames.end());
 
   RayTables tables(options);
@@ -316,6 +427,7 @@ GenerateResult generateDataset(const GenerateOptions& options,
       hashes = {sha256Hex(png), sha256Hex(labels)};
     }
     const std::lock_guard lock(mutex);
+    if (!keep) journal.add(index, hashes);
     ++(keep ? result.kept : result.written);
     ++progress.done;
     if (on_progress) on_progress(progress);
@@ -333,7 +445,11 @@ GenerateResult generateDataset(const GenerateOptions& options,
   const std::string own_text = manifest.text();
   const std::string own_path = options.out + "/" + own_name;
   if (!fileHas(own_path, sha256Hex(own_text))) writeFileAtomically(own_path, own_text);
-  if (options.shard_count == 1) return result;
+  journal.remove();
+  if (options.shard_count == 1) {
+    removeJournals(options.out);
+    return result;
+  }
 
   // The last shard to finish finds all manifests and merges them; the bytes are those of one run.
   earlier = readManifests(options.out, config);
@@ -347,6 +463,7 @@ GenerateResult generateDataset(const GenerateOptions& options,
     return a.first < b.first;
   });
   writeFileAtomically(options.out + "/manifest.json", merged.text());
+  removeJournals(options.out);
   return result;
 }
 

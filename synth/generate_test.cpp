@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <csignal>
 #include <filesystem>
 #include <fstream>
 #include <map>
@@ -118,6 +119,79 @@ TEST(Generate, KeepsWhatIsFinishedAndRepairsWhatIsNot) {
   fs::remove(options.out + "/manifest.json");
   EXPECT_EQ(generate(options).written, 6);
   EXPECT_EQ(contentOf(options.out), reference);
+}
+
+/// Stops after `frames` frames, as an interrupt does.
+void generateSome(const GenerateOptions& options, int frames) {
+  struct Interrupted {};
+  EXPECT_THROW((void)generateDataset(options,
+                                     [&](const GenerateProgress& p) {
+                                       if (p.done == frames) throw Interrupted();
+                                     }),
+               Interrupted);
+}
+
+TEST(Generate, GoesOnWhereItWasInterrupted) {
+  const TempFolder temp;
+  GenerateOptions options = smallOptions(temp.at("whole"));
+  (void)generate(options);
+  const auto reference = contentOf(options.out);
+  for (const int jobs : {1, 2}) {
+    options.out = temp.at("jobs" + std::to_string(jobs));
+    options.jobs = jobs;
+    generateSome(options, 3);
+    EXPECT_FALSE(fs::exists(options.out + "/manifest.json"));
+    generateSome(options, 4);  // Interrupted again: the second run adds to the first one's journal.
+    const std::string journal = options.out + "/journal.txt";
+    // The last line torn, a file that is not what its line says, one that is half written.
+    std::ofstream(journal, std::ios::app) << "5 0123";
+    std::ofstream(options.out + "/images/000000.png") << "x";
+    std::ofstream(options.out + "/images/000000.png.tmp-1-2") << "x";
+    const GenerateResult result = generate(options);
+    EXPECT_GE(result.kept, jobs == 1 ? 3 : 2);
+    EXPECT_GE(result.written, 1);
+    EXPECT_EQ(result.kept + result.written, 6);
+    EXPECT_EQ(contentOf(options.out), reference);
+  }
+  // A shard's journal is of use to whoever makes the frames.
+  options.out = temp.at("shards");
+  options.shard_count = 2;
+  generateSome(options, 2);
+  options.shard_count = 1;
+  EXPECT_GE(generate(options).kept, 2);
+  EXPECT_EQ(contentOf(options.out), reference);
+}
+
+TEST(Generate, GoesOnWhereItWasKilled) {
+  GTEST_FLAG_SET(death_test_style, "threadsafe");
+  const TempFolder temp;
+  GenerateOptions options = smallOptions(temp.at("killed"));
+  options.jobs = 2;
+  // With two threads the other frame is at any place of its making.
+  EXPECT_EXIT((void)generateDataset(options,
+                                    [](const GenerateProgress& p) {
+                                      if (p.done == 3) (void)std::raise(SIGKILL);
+                                    }),
+              testing::KilledBySignal(SIGKILL),
+              "");
+  const GenerateResult result = generate(options);
+  EXPECT_GE(result.kept, 3);
+  EXPECT_EQ(result.kept + result.written, 6);
+  const auto resumed = contentOf(options.out);
+  options.out = temp.at("whole");
+  (void)generate(options);
+  EXPECT_EQ(resumed, contentOf(options.out));
+}
+
+TEST(Generate, RefusesAnotherRunsJournal) {
+  const TempFolder temp;
+  GenerateOptions options = smallOptions(temp.at("data"));
+  generateSome(options, 1);
+  const auto before = contentOf(options.out);
+  options.seed = 10;
+  EXPECT_THROW((void)generate(options), InputError);
+  EXPECT_NE(messageOf(options).find("journal.txt"), std::string::npos) << messageOf(options);
+  EXPECT_EQ(contentOf(options.out), before);
 }
 
 TEST(Generate, RefusesAnotherDatasetsFolder) {
