@@ -9,6 +9,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <sstream>
 
@@ -115,7 +116,14 @@ TEST_F(Cli, HelpShowsExamples) {
 }
 
 TEST_F(Cli, UsageErrorsAreTwo) {
-  expectRefused("", 2, "command");
+  expectRefused("", 2, "generate, detect, evaluate, camera, report, replay");
+  for (const char* seed : {"18446744073709551616", "0x10", "+1", "1.0", "1e3", "\"''\""}) {
+    expectRefused(std::string("generate --camera wide.yaml --out data --seed ") + seed, 2, "seed");
+  }
+  expectRefused("generate --camera wide.yaml --out data --count 0x1", 2, "0x1");
+  expectRefused("generate --camera wide.yaml --out data --jobs 0x1", 2, "0x1");
+  expectRefused("evaluate --data data --jobs 0x1", 2, "0x1");
+  expectRefused("report --data data --out o --jobs 1025", 2, "1025");
   expectRefused("paint", 2, "paint");
   expectRefused("generate --out data", 2, "--camera");
   expectRefused("generate --camera wide.yaml --out data --colour red", 2, "--colour");
@@ -189,7 +197,13 @@ TEST_F(Cli, FromGenerateToReport) {
   Result result = dlsd("detect --data data --time --out det.jsonl --overlay overlays");
   ASSERT_EQ(result.code, 0) << result.err;
   EXPECT_EQ(result.out, "");
-  EXPECT_EQ(result.err, "");  // no progress where there is no terminal
+  // No progress where there is no terminal; what --time adds.
+  EXPECT_THAT(result.err, StartsWith("stage       median ms\ngradient  "));
+  for (const char* stage : {"anchors", "linking", "chains", "planes", "validation", "total"}) {
+    EXPECT_THAT(result.err, HasSubstr(std::string("\n") + stage + " "));
+  }
+  EXPECT_THAT(result.err, EndsWith("\nimages              2\n"));
+  EXPECT_EQ(dlsd("detect --data data --out other.jsonl").err, "");
   EXPECT_TRUE(fs::exists(folder / "overlays/000001.png"));
   std::istringstream lines(contentOf(folder / "det.jsonl"));
   size_t count = 0;
@@ -238,6 +252,154 @@ TEST_F(Cli, DetectionIsTheSameToStdoutAndFileAndForEachWayToNameTheImages) {
   EXPECT_EQ(by_camera.at("lines"), first.at("lines"));
   EXPECT_EQ(by_camera.at("image"), "data/images/000000.png");
   EXPECT_FALSE(by_camera.contains("time_ms"));
+}
+
+TEST_F(Cli, NoInputIsOverwritten) {
+  generate();
+  fs::create_directories(folder / "in");
+  for (const char* name : {"a.png", "b.png"}) {
+    fs::copy_file(folder / "data/images/000000.png", folder / "in" / name);
+  }
+  fs::create_directory_symlink("in", folder / "link");
+  fs::create_symlink("in/a.png", folder / "a.jsonl");
+  fs::create_hard_link(folder / "in/b.png", folder / "b.jsonl");
+  ASSERT_EQ(dlsd("detect --data data --out det.jsonl").code, 0);
+  std::map<std::string, std::string> before;
+  for (const std::string& name : files()) {
+    before[name] = contentOf(folder / name);
+  }
+  const std::string detect = "detect --camera wide.yaml ";
+  const struct {
+    std::string arguments, part;
+  } cases[] = {
+      {"detect --data data --overlay data/images", "is the input data/images/000000.png"},
+      {"detect --data data --out data/images/000001.png", "is the input data/images/000001.png"},
+      {"detect --data data --out ./data/../data/manifest.json", "manifest.json"},
+      {"detect --data data --out data/labels/000000.json", "labels/000000.json"},
+      {"detect --data data --out data/cameras/wide.yaml", "cameras/wide.yaml"},
+      {detect + "in/a.png --out in/a.png", "in/a.png: will not be overwritten"},
+      {detect + "in/a.png in/b.png --out $PWD/in/b.png", "is the input in/b.png"},
+      {detect + "in/a.png --out link/a.png", "is the input in/a.png"},
+      {detect + "in/a.png --out a.jsonl", "is the input in/a.png"},
+      {detect + "in/b.png --out b.jsonl", "is the input in/b.png"},
+      {detect + "in/a.png --overlay in", "is the input in/a.png"},
+      {detect + "link/a.png --overlay ./in/", "is the input link/a.png"},
+      {detect + "in/a.png --out wide.yaml", "is the input wide.yaml"},
+      {"detect --camera wide.yaml:cam0 in/a.png --out wide.yaml", "is the input wide.yaml"},
+      {detect + "in/a.png data/../in/a.png --overlay o", "o/a.png"},
+      {detect + "in/a.png elsewhere/a.png --overlay o", "o/a.png"},
+      {detect + "x.jpg x.png --overlay o", "o/x.png"},
+      {detect + "in/a.png --overlay o --out o/a.png", "o/a.png"},
+      {"evaluate --data data --detections det.jsonl --json det.jsonl", "is the input det.jsonl"},
+      {"evaluate --data data --json data/manifest.json", "is the input data/manifest.json"}};
+  for (const auto& c : cases) {
+    expectRefused(c.arguments, 2, c.part);
+  }
+  for (const auto& [name, content] : before) {
+    EXPECT_EQ(contentOf(folder / name), content) << name;
+  }
+  // The output of an earlier run is no input.
+  EXPECT_EQ(dlsd(detect + "in/a.png in/b.png --overlay o --out d.jsonl").code, 0);
+  EXPECT_EQ(dlsd(detect + "in/a.png in/b.png --overlay o --out d.jsonl").code, 0);
+}
+
+TEST_F(Cli, ANameThatJsonCannotHoldIsABadImageAmongMany) {
+  generate();
+  const std::string name = "caf\xe9.png";
+  fs::copy_file(folder / "data/images/000000.png", folder / name);
+  fs::copy_file(folder / "wide.yaml", folder / "w\xef.yaml");
+  const Result result = dlsd("detect --camera wide.yaml '" + name +
+                             "' data/images/000001.png --out d.jsonl --overlay o");
+  EXPECT_EQ(result.code, 2);
+  EXPECT_THAT(result.err, StartsWith("dlsd: " + name + ": the name is not UTF-8"));
+  EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1);
+  const std::string text = contentOf(folder / "d.jsonl");
+  EXPECT_EQ(nlohmann::json::parse(text).at("image"), "data/images/000001.png");
+  expectRefused("detect --camera 'w\xef.yaml' data/images/000001.png", 2, "not UTF-8");
+  ASSERT_EQ(dlsd("detect --data data --out 'd\xe9.jsonl'").code, 0);
+  expectRefused("evaluate --data data --detections 'd\xe9.jsonl' --json e.json", 2, "not UTF-8");
+  EXPECT_EQ(dlsd("evaluate --data data --detections 'd\xe9.jsonl'").code, 0);
+}
+
+TEST_F(Cli, OutIsWrittenUnlessAllImagesFailed) {
+  generate();
+  write("bad.png", "no image");
+  write("d.jsonl", "old\n");
+  const std::string detect = "detect --camera wide.yaml bad.png --out ";
+  expectRefused(detect + "new.jsonl", 2, "; new.jsonl was not written\n");
+  expectRefused(detect + "d.jsonl", 2, "; d.jsonl was not written and is as before\n");
+  EXPECT_EQ(contentOf(folder / "d.jsonl"), "old\n");
+
+  auto manifest = nlohmann::json::parse(contentOf(folder / "data/manifest.json"));
+  manifest["frames"] = nlohmann::json::array();
+  write("data/manifest.json", manifest.dump());
+  for (const char* name : {"d.jsonl", "e.jsonl"}) {
+    EXPECT_EQ(dlsd(std::string("detect --data data --time --out ") + name).code, 0);
+    EXPECT_TRUE(fs::exists(folder / name));
+    EXPECT_EQ(contentOf(folder / name), "");
+  }
+}
+
+TEST_F(Cli, CodecsSayNothing) {
+  generate();
+  ASSERT_EQ(dlsd("detect --data data --out det.jsonl").code, 0);
+  const fs::path image = folder / "data/images/000000.png";
+  const std::string png = contentOf(image);
+  std::string flipped = png;
+  flipped[flipped.size() / 2] = char(~flipped[flipped.size() / 2]);
+  // A TIFF file whose directory lies behind its end.
+  const std::string tiff("II*\0\xf0\xff\0\0 some bytes that are no directory", 42);
+  for (const std::string& content : {png.substr(0, png.size() / 2), flipped, tiff}) {
+    write("data/images/000000.png", content);
+    expectRefused("evaluate --data data", 2, "images/000000.png");
+    expectRefused("report --data data --out gallery", 2, "images/000000.png");
+    expectRefused(
+        "report --data data --detections det.jsonl --out gallery", 2, "images/000000.png");
+    expectRefused("detect --camera wide.yaml data/images/000000.png", 2, "images/000000.png");
+  }
+}
+
+TEST_F(Cli, SeedsAreDecimalNumbersUpTo64Bit) {
+  for (const char* seed : {"18446744073709551615", "010"}) {
+    ASSERT_EQ(
+        dlsd(std::string("generate --camera wide.yaml --out data-") + seed + " --seed " + seed)
+            .code,
+        0);
+  }
+  const auto seedOf = [&](const std::string& data) {
+    return nlohmann::json::parse(contentOf(folder / data / "manifest.json"))
+        .at("config")
+        .at("seed")
+        .get<uint64_t>();
+  };
+  EXPECT_EQ(seedOf("data-18446744073709551615"), UINT64_MAX);
+  EXPECT_EQ(seedOf("data-010"), 10U);
+}
+
+TEST_F(Cli, InterruptedRunsLeaveNothingHalfWritten) {
+  const struct {
+    std::string name;
+    int code;
+  } cases[] = {{"INT", 130}, {"TERM", 143}};
+  for (const auto& [name, code] : cases) {
+    SCOPED_TRACE(name);
+    const std::string data = "data-" + name;
+    const std::string command =
+        "cd '" + folder.string() + "' && timeout --preserve-status -s " + name +
+        " 0.7 '" DLSD_BINARY "' generate --camera wide.yaml --count 1000000 --out " + data +
+        " 2>.stderr";
+    const int status = std::system(command.c_str());
+    EXPECT_EQ(WEXITSTATUS(status), code);
+    EXPECT_EQ(contentOf(folder / ".stderr"), "");
+    EXPECT_FALSE(fs::exists(folder / data / "manifest.json"));
+    for (const std::string& file : files()) {
+      if (file.starts_with(data + "/labels/") && file.ends_with(".json")) {
+        EXPECT_TRUE(nlohmann::json::accept(contentOf(folder / file))) << file;
+      } else if (file.starts_with(data + "/images/") && file.ends_with(".png")) {
+        EXPECT_THAT(contentOf(folder / file), EndsWith("IEND\xae\x42\x60\x82")) << file;
+      }
+    }
+  }
 }
 
 TEST_F(Cli, OneBadImageAmongManyIsNamedAndTheOthersAreDone) {
@@ -313,6 +475,8 @@ TEST_F(Cli, BadDataAndDetectionsAreTwo) {
   expectRefused("evaluate --data data --rho 0", 2, "rho");
   expectRefused("evaluate --data data --rho nan", 2, "rho");
   expectRefused("evaluate --data data --rho 1,x", 2, "x");
+  expectRefused("evaluate --data data --rho 1,2,3,4,5,6,7,8,9", 2, "at most 8");
+  expectRefused("report --data data --out gallery --rho 1,2,3,4,5,6,7,8,9", 2, "at most 8");
   expectRefused("evaluate --data data --jobs -1", 2, "-1");
   expectRefused("evaluate --data data --min-recall 0.9", 2, "0.9");
   expectRefused("evaluate --data data --min-recall 98@1", 2, "98@1");
@@ -346,7 +510,7 @@ TEST_F(Cli, BadDataAndDetectionsAreTwo) {
 }
 
 TEST_F(Cli, MinRecallIsAGate) {
-  generate();
+  generate("--scene paper");
   const std::string nothing = R"({"image": "images/000000.png", "lines": []})"
                               "\n"
                               R"({"image": "images/000001.png", "lines": []})"

@@ -2,6 +2,7 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -9,17 +10,39 @@
 #include <chrono>
 #include <cstdio>
 #include <filesystem>
+#include <map>
+#include <nlohmann/json.hpp>
 #include <system_error>
 #include <utility>
 
 #include "cameras/calibration/files.h"
 
+// Only in builds with sanitizers, whose reports must not be hushed.
+extern "C" __attribute__((weak)) void __sanitizer_set_report_fd(void* fd);
+
 namespace dlsd::cli {
 namespace {
+
+/// Where our own words go; what libraries say goes to `stderr`.
+FILE* our_stderr = stderr;
 
 double now() {
   using Clock = std::chrono::steady_clock;
   return std::chrono::duration<double>(Clock::now().time_since_epoch()).count();
+}
+
+/// What a path leads to: the file if there is one, else the place. Empty for devices and pipes,
+/// which nothing replaces.
+std::string identityOf(const std::string& path) {
+  namespace fs = std::filesystem;
+  struct stat status {};
+  if (::stat(path.c_str(), &status) == 0) {
+    return S_ISREG(status.st_mode) ? fmt::format("{}:{}", status.st_dev, status.st_ino) : "";
+  }
+  std::error_code error;
+  const fs::path absolute = fs::absolute(path, error);
+  const fs::path place = fs::weakly_canonical(absolute, error);
+  return (error ? absolute.lexically_normal() : place).string();
 }
 
 }  // namespace
@@ -34,7 +57,77 @@ void print(std::string_view text) {
 void complain(std::string_view sentence) {
   std::string line(sentence);
   std::replace(line.begin(), line.end(), '\n', ' ');
-  fmt::print(stderr, "dlsd: {}\n", line);
+  tell("dlsd: " + line + "\n");
+}
+
+void tell(std::string_view text) {
+  std::fwrite(text.data(), 1, text.size(), our_stderr);
+  std::fflush(our_stderr);
+}
+
+void hushLibraries() {
+  const int nowhere = ::open("/dev/null", O_WRONLY | O_CLOEXEC);
+  const int copy = ::fcntl(STDERR_FILENO, F_DUPFD_CLOEXEC, STDERR_FILENO + 1);
+  FILE* const stream = nowhere >= 0 && copy >= 0 ? ::fdopen(copy, "w") : nullptr;
+  if (stream != nullptr && ::dup2(nowhere, STDERR_FILENO) >= 0) {
+    our_stderr = stream;
+    if (__sanitizer_set_report_fd != nullptr) {
+      // NOLINTNEXTLINE(performance-no-int-to-ptr): that interface takes the number as a pointer.
+      __sanitizer_set_report_fd(reinterpret_cast<void*>(static_cast<intptr_t>(copy)));
+    }
+  }
+  if (nowhere > STDERR_FILENO) {
+    ::close(nowhere);
+  }
+}
+
+bool isUtf8(const std::string& text) {
+  try {
+    (void)nlohmann::json(text).dump();
+    return true;
+  } catch (const nlohmann::json::type_error&) {
+    return false;
+  }
+}
+
+std::vector<std::string> filesOf(const Dataset& dataset) {
+  std::vector<std::string> files{dataset.folder() + "/manifest.json"};
+  const auto add = [&](const nlohmann::ordered_json& name) {
+    files.push_back(dataset.folder() + "/" + name.get<std::string>());
+  };
+  for (const auto& camera : dataset.manifest().at("cameras")) {
+    add(camera.at("file"));
+  }
+  for (const auto& frame : dataset.manifest().at("frames")) {
+    add(frame.at("image"));
+    add(frame.at("labels"));
+  }
+  return files;
+}
+
+std::string calibrationFile(const std::string& path_and_camera) {
+  std::error_code ignored;
+  return std::filesystem::exists(path_and_camera, ignored)
+             ? path_and_camera
+             : path_and_camera.substr(0, path_and_camera.rfind(':'));
+}
+
+void checkOutputs(const std::vector<std::string>& inputs, const std::vector<std::string>& outputs) {
+  std::map<std::string, std::string> taken;  // what a path leads to -> why nothing may go there
+  for (const std::string& input : inputs) {
+    taken.emplace(identityOf(input), "is the input " + input);
+  }
+  taken.erase("");
+  for (const std::string& output : outputs) {
+    const std::string identity = identityOf(output);
+    if (identity.empty()) {
+      continue;
+    }
+    const auto [it, is_new] = taken.emplace(identity, "is where " + output + " is to be written");
+    if (!is_new) {
+      throw InputError(output + ": will not be overwritten, it " + it->second);
+    }
+  }
 }
 
 void checkPlaceForFile(const std::string& path) {
@@ -53,30 +146,16 @@ void checkPlaceForFile(const std::string& path) {
   }
 }
 
-QuietLibraries::QuietLibraries() : stderr_copy_(::dup(STDERR_FILENO)) {
-  if (const int nowhere = ::open("/dev/null", O_WRONLY | O_CLOEXEC); nowhere >= 0) {
-    ::dup2(nowhere, STDERR_FILENO);
-    ::close(nowhere);
-  }
-}
-
-QuietLibraries::~QuietLibraries() {
-  if (stderr_copy_ >= 0) {
-    ::dup2(stderr_copy_, STDERR_FILENO);
-    ::close(stderr_copy_);
-  }
-}
-
 Progress::Progress(std::string noun, size_t total)
     : noun_(std::move(noun)),
       total_(total),
-      terminal_(::isatty(STDERR_FILENO) == 1),
+      terminal_(::isatty(::fileno(our_stderr)) == 1),
       start_s_(now()),
       shown_s_(start_s_) {}
 
 Progress::~Progress() {
   if (terminal_) {
-    fmt::print(stderr, "\r\033[K");
+    tell("\r\033[K");
   }
 }
 
@@ -87,14 +166,12 @@ void Progress::done(size_t count) {
   }
   shown_s_ = t;
   const double rate = double(count) / (t - start_s_);
-  fmt::print(stderr,
-             "\r\033[K{}/{} {}, {:.1f} a second, {:.0f} s left",
-             count,
-             total_,
-             noun_,
-             rate,
-             double(total_ - std::min(total_, count)) / rate);
-  std::fflush(stderr);
+  tell(fmt::format("\r\033[K{}/{} {}, {:.1f} a second, {:.0f} s left",
+                   count,
+                   total_,
+                   noun_,
+                   rate,
+                   double(total_ - std::min(total_, count)) / rate));
 }
 
 }  // namespace dlsd::cli

@@ -2,9 +2,14 @@
 // The commands of `dlsd`, one file each, and what they share.
 
 #include <CLI/App.hpp>
+#include <charconv>
+#include <concepts>
 #include <functional>
 #include <string>
 #include <string_view>
+#include <vector>
+
+#include "synth/dataset/dataset.h"
 
 namespace dlsd::cli {
 
@@ -29,22 +34,47 @@ void print(std::string_view text);
 /// One sentence on standard error: "dlsd: ...". Line breaks inside become spaces.
 void complain(std::string_view sentence);
 
+/// Text on standard error that is no complaint.
+void tell(std::string_view text);
+
+/// From now on nothing that libraries write to standard error arrives there; tell(), complain() and
+/// Progress do. Codecs comment on bad files, from any thread, and the user is told once, by us.
+void hushLibraries();
+
+/// For an option with a whole number: decimal digits (a minus first where min < 0) in [min, max],
+/// nothing else. CLI11 alone reads 0x10, 010 and numbers that are too large.
+template <std::integral T>
+[[nodiscard]] CLI::Validator wholeNumber(T min, T max) {
+  const std::string range = "[" + std::to_string(min) + ", " + std::to_string(max) + "]";
+  return {[=](std::string& text) -> std::string {
+            T value{};
+            const char* end = text.data() + text.size();
+            const auto read = std::from_chars(text.data(), end, value);
+            if (read.ec != std::errc() || read.ptr != end || value < min || value > max) {
+              return "is \"" + text + "\", allowed is a whole number in " + range;
+            }
+            text = std::to_string(value);  // no leading zeros, which CLI11 takes for octal
+            return {};
+          },
+          "in " + range};
+}
+
+/// Whether the text can stand in JSON.
+[[nodiscard]] bool isUtf8(const std::string& text);
+
+/// The files that the manifest names, and the manifest.
+[[nodiscard]] std::vector<std::string> filesOf(const Dataset& dataset);
+
+/// The file of "file" or "file:camera".
+[[nodiscard]] std::string calibrationFile(const std::string& path_and_camera);
+
+/// Throws InputError if one of the outputs is one of the inputs, by whatever path or link, or
+/// another output.
+void checkOutputs(const std::vector<std::string>& inputs, const std::vector<std::string>& outputs);
+
 /// Throws SystemError if a file can't be put at `path` since its folder is missing or a folder
 /// stands there: asked before long work.
 void checkPlaceForFile(const std::string& path);
-
-/// While it lives, nothing that libraries say reaches standard error: codecs comment on bad files
-/// there, and the user is told once, by us. For one thread at a time.
-class QuietLibraries {
- public:
-  QuietLibraries();
-  ~QuietLibraries();
-  QuietLibraries(const QuietLibraries&) = delete;
-  QuietLibraries& operator=(const QuietLibraries&) = delete;
-
- private:
-  int stderr_copy_;
-};
 
 /// Progress on standard error with rate and remaining time, on one line that is cleared at the end.
 /// Says nothing if standard error is not a terminal.

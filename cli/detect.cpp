@@ -2,11 +2,11 @@
 
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
+#include <algorithm>
 #include <filesystem>
 #include <map>
 #include <memory>
-#include <optional>
-#include <set>
+#include <utility>
 
 #include "cameras/calibration/calibration.h"
 #include "cameras/calibration/files.h"
@@ -33,6 +33,7 @@ struct Task {
 
 struct Work {
   std::vector<Task> tasks;
+  std::vector<std::string> inputs;        ///< All files that are read.
   std::map<std::string, Camera> cameras;  ///< By the record's name.
 };
 
@@ -43,6 +44,7 @@ Work workOf(const Arguments& arguments) {
       throw InputError("--data brings its own images and cameras, neither may be given with it");
     }
     const Dataset dataset(arguments.data);
+    work.inputs = filesOf(dataset);
     for (size_t i = 0; i < dataset.size(); ++i) {
       const LabelRecord record = dataset.labels(i);
       work.tasks.push_back({arguments.data + "/" + record.image, record.image, record.camera});
@@ -53,9 +55,14 @@ Work workOf(const Arguments& arguments) {
   if (arguments.camera.empty() || arguments.images.empty()) {
     throw InputError("either --camera and images or --data is needed");
   }
+  if (!isUtf8(arguments.camera)) {
+    throw InputError(arguments.camera + ": the name is not UTF-8, as the records need it");
+  }
+  work.inputs.push_back(calibrationFile(arguments.camera));
   work.cameras.emplace(arguments.camera, loadCamera(arguments.camera));
   for (const std::string& image : arguments.images) {
     work.tasks.push_back({image, image, arguments.camera});
+    work.inputs.push_back(image);
   }
   return work;
 }
@@ -64,20 +71,46 @@ std::string overlayPath(const std::string& folder, const Task& task) {
   return folder + "/" + std::filesystem::path(task.path).stem().string() + ".png";
 }
 
+/// Median over the images of each stage's time.
+std::string table(const std::vector<StageTimes>& times) {
+  constexpr std::pair<const char*, double StageTimes::*> kStages[] = {
+      {"gradient", &StageTimes::gradient},
+      {"anchors", &StageTimes::anchors},
+      {"linking", &StageTimes::linking},
+      {"chains", &StageTimes::chains},
+      {"planes", &StageTimes::planes},
+      {"validation", &StageTimes::validation},
+      {"total", &StageTimes::total}};
+  std::string text = fmt::format("{:<10}  {:>9}\n", "stage", "median ms");
+  for (const auto& [name, stage] : kStages) {
+    std::vector<double> ms;
+    for (const StageTimes& t : times) {
+      ms.push_back(1000 * t.*stage);
+    }
+    std::sort(ms.begin(), ms.end());
+    const double median = (ms[(ms.size() - 1) / 2] + ms[ms.size() / 2]) / 2;
+    text += fmt::format("{:<10}  {:>9.3f}\n", name, median);
+  }
+  return text + fmt::format("{:<10}  {:>9}\n", "images", times.size());
+}
+
 int run(const Arguments& arguments) {
   const Work work = workOf(arguments);
   const bool to_stdout = arguments.out == "-";
+  std::vector<std::string> outputs;
+  if (!to_stdout) {
+    outputs.push_back(arguments.out);
+  }
+  if (!arguments.overlay.empty()) {
+    for (const Task& task : work.tasks) {
+      outputs.push_back(overlayPath(arguments.overlay, task));
+    }
+  }
+  checkOutputs(work.inputs, outputs);
   if (!to_stdout) {
     checkPlaceForFile(arguments.out);
   }
   if (!arguments.overlay.empty()) {
-    std::set<std::string> paths;
-    for (const Task& task : work.tasks) {
-      if (!paths.insert(overlayPath(arguments.overlay, task)).second) {
-        throw InputError("--overlay: two images would be written to " +
-                         overlayPath(arguments.overlay, task));
-      }
-    }
     makeFolders(arguments.overlay);
   }
 
@@ -89,6 +122,7 @@ int run(const Arguments& arguments) {
 
   std::string output;
   std::vector<std::string> complaints;
+  std::vector<StageTimes> times;
   {
     Progress progress("images", work.tasks.size());
     for (size_t i = 0; i < work.tasks.size(); ++i) {
@@ -96,10 +130,10 @@ int run(const Arguments& arguments) {
       Detector& detector = detectors.at(task.camera);
       const Camera& camera = detector.camera();
       try {
-        const Image image = [&] {
-          const QuietLibraries quiet;
-          return readImage(task.path);
-        }();
+        if (!isUtf8(task.image)) {
+          throw InputError(task.path + ": the name is not UTF-8, as a record needs it");
+        }
+        const Image image = readImage(task.path);
         if (image.width != camera.width() || image.height != camera.height()) {
           throw InputError(fmt::format("{}: is {}x{} px, its camera {} is {}x{} px",
                                        task.path,
@@ -116,7 +150,8 @@ int run(const Arguments& arguments) {
         record.height = image.height;
         record.lines = detectLines(detector, image);
         if (arguments.time) {
-          record.time_ms = 1000 * detector.times().total;
+          times.push_back(detector.times());
+          record.time_ms = 1000 * times.back().total;
         }
         if (!arguments.overlay.empty()) {
           writeFileAtomically(overlayPath(arguments.overlay, task),
@@ -134,8 +169,19 @@ int run(const Arguments& arguments) {
       progress.done(i + 1);
     }
   }
-  if (!to_stdout && complaints.size() < work.tasks.size()) {
-    writeFileAtomically(arguments.out, output);
+  if (!to_stdout) {
+    if (complaints.empty() || complaints.size() < work.tasks.size()) {
+      writeFileAtomically(arguments.out, output);
+    } else {
+      std::error_code ignored;
+      complaints.back() +=
+          fmt::format("; {} was not written{}",
+                      arguments.out,
+                      std::filesystem::exists(arguments.out, ignored) ? " and is as before" : "");
+    }
+  }
+  if (!times.empty()) {
+    tell(table(times));
   }
   for (const std::string& complaint : complaints) {
     complain(complaint);
@@ -167,8 +213,10 @@ Run addDetect(CLI::App& command) {
                   arguments->overlay,
                   "Folder for PNG images with the detections drawn on them")
       ->type_name("DIR");
-  command.add_flag(
-      "--time", arguments->time, "Add time_ms: how long detection took, reading apart");
+  command.add_flag("--time",
+                   arguments->time,
+                   "Add time_ms: how long detection took, reading apart; at the end the median "
+                   "time of each stage over the images on standard error");
   command.footer(
       "Examples:\n"
       "  dlsd detect --camera wide.yaml frame.png\n"

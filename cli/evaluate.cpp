@@ -66,10 +66,20 @@ int run(Arguments& arguments) {
     checkPlaceForFile(arguments.json);
   }
   const Dataset dataset(arguments.data);
+  if (!arguments.json.empty()) {
+    std::vector<std::string> inputs = filesOf(dataset);
+    if (!arguments.detections.empty()) {
+      inputs.push_back(arguments.detections);
+    }
+    checkOutputs(inputs, {arguments.json});
+  }
   std::vector<std::pair<std::string, DetectionSource>> sources;
   if (!arguments.detections.empty()) {
-    sources.emplace_back(std::filesystem::path(arguments.detections).filename().string(),
-                         detectionsOfFile(dataset, arguments.detections));
+    const std::string name = std::filesystem::path(arguments.detections).filename().string();
+    if (!arguments.json.empty() && !isUtf8(name)) {
+      throw InputError(arguments.detections + ": the name is not UTF-8, as --json needs it");
+    }
+    sources.emplace_back(name, detectionsOfFile(dataset, arguments.detections));
   } else {
     for (const std::string& name : arguments.detectors) {
       sources.emplace_back(name, detectionsOfDetector(dataset, name));
@@ -149,7 +159,7 @@ Run addEvaluate(CLI::App& command) {
       ->type_name("SHARE@RHO");
   command.add_option("--jobs", arguments->jobs, "Threads; 0: one per core")
       ->capture_default_str()
-      ->check(CLI::Range(0, 1024));
+      ->transform(wholeNumber(0, 1024));
   command.footer(
       "Examples:\n"
       "  dlsd evaluate --data data\n"

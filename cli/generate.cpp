@@ -6,6 +6,7 @@
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
 #include <charconv>
+#include <cstdint>
 #include <filesystem>
 #include <memory>
 #include <set>
@@ -100,9 +101,11 @@ Run addGenerate(CLI::App& command) {
                   fmt::format("Scene preset: {}", fmt::join(scenePresets(), ", ")))
       ->type_name("NAME")
       ->capture_default_str();
-  command.add_option("--count", options.count, "Frames")->capture_default_str();
+  command.add_option("--count", options.count, "Frames")
+      ->transform(wholeNumber(1, 10000000))
+      ->capture_default_str();
   command.add_option("--seed", options.seed, "Seed; the same seed gives the same bytes")
-      ->check(CLI::NonNegativeNumber)  // CLI11 would wrap -1 around
+      ->transform(wholeNumber<uint64_t>(0, UINT64_MAX))
       ->capture_default_str();
   command
       .add_option(
@@ -115,7 +118,9 @@ Run addGenerate(CLI::App& command) {
       ->type_name("NAME")
       ->capture_default_str()
       ->check(CLI::IsMember({"linear", "srgb"}));
-  command.add_option("--jobs", options.jobs, "Threads; 0: one per core")->capture_default_str();
+  command.add_option("--jobs", options.jobs, "Threads; 0: one per core")
+      ->transform(wholeNumber(0, 1024))
+      ->capture_default_str();
   command
       .add_option("--shard", arguments->shard, "i/n: make only the frames with number mod n = i")
       ->type_name("I/N");

@@ -1,5 +1,8 @@
 // The program `dlsd`: reads the command line, runs one command, turns errors into exit codes.
 
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
 #include <CLI/App.hpp>
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
@@ -7,6 +10,7 @@
 #include <filesystem>
 #include <new>
 #include <stdexcept>
+#include <string_view>
 #include <vector>
 
 #include "cameras/calibration/files.h"
@@ -59,13 +63,18 @@ int run(int argc, char** argv) {
       return execute();
     }
   }
-  complain("a command is needed: generate, detect, evaluate, camera or report (dlsd --help)");
+  std::vector<std::string_view> names;
+  for (const Entry& entry : kCommands) {
+    names.emplace_back(entry.name);
+  }
+  complain(fmt::format("a command is needed, one of {} (dlsd --help)", fmt::join(names, ", ")));
   return kBadInput;
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
+  hushLibraries();
   try {
     return run(argc, argv);
   } catch (const dlsd::InputError& error) {

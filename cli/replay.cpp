@@ -62,7 +62,7 @@ Run addReplay(CLI::App& command) {
   command.footer(
       "Examples:\n"
       "  dlsd replay fixtures/counterexamples/x.json\n"
-      "  dlsd replay case.json --out /tmp/look      then open overlay.svg: missed labels are "
+      "  dlsd replay case.json --out look      then open overlay.svg: missed labels are "
       "red\n\n"
       "Exit code 1 if the case still fails.");
   return [options] { return replay(*options); };

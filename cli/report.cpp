@@ -54,7 +54,7 @@ Run addReport(CLI::App& command) {
       ->delimiter(',');
   command.add_option("--jobs", arguments->options.jobs, "Threads; 0: one per core")
       ->capture_default_str()
-      ->check(CLI::Range(0, 1024));
+      ->transform(wholeNumber(0, 1024));
   command.footer(
       "Examples:\n"
       "  dlsd report --data data --out data/gallery\n"

@@ -11,6 +11,7 @@
 #include <mutex>
 #include <optional>
 #include <stdexcept>
+#include <system_error>
 #include <thread>
 
 #include "cameras/calibration/files.h"
@@ -129,14 +130,16 @@ void evaluateFrames(const Dataset& dataset,
     }
     handed_over.notify_all();
   };
-  std::vector<std::thread> pool;
-  for (size_t t = 1; t < threads; ++t) {
-    pool.emplace_back(work);
+  std::vector<std::jthread> pool;
+  pool.reserve(threads);
+  try {
+    while (pool.size() + 1 < threads) {
+      pool.emplace_back(work);
+    }
+  } catch (const std::system_error&) {  // no more threads to be had: those that run do it
   }
   work();
-  for (std::thread& thread : pool) {
-    thread.join();
-  }
+  pool.clear();  // joins
   if (!errors.empty()) {
     std::rethrow_exception(errors.begin()->second);
   }

@@ -2,6 +2,10 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <pthread.h>
+
+#include <system_error>
+#include <thread>
 
 #include "evaluation/detections.h"
 #include "evaluation/hand_made.h"
@@ -135,6 +139,27 @@ TEST_F(DatasetEvaluation, EveryFrameOnceInOrderWhateverTheThreads) {
   }
   EXPECT_THAT(texts.front(), testing::HasSubstr(R"("name":"right","frames":11)"));
 }
+
+#ifdef __GLIBC__
+TEST_F(DatasetEvaluation, GoesOnWithFewerThreadsThanAskedFor) {
+  writeDataset(data, exampleLabels(5));
+  const Dataset dataset(data);
+  const DetectionSource none = [] {
+    return [](size_t, const LabelRecord&) { return std::vector<DetectionLine>{}; };
+  };
+  // Stacks larger than the address space: no thread can be made.
+  pthread_attr_t usual, huge;
+  ASSERT_EQ(pthread_getattr_default_np(&usual), 0);
+  ASSERT_EQ(pthread_attr_init(&huge), 0);
+  ASSERT_EQ(pthread_attr_setstacksize(&huge, size_t{1} << 50), 0);
+  ASSERT_EQ(pthread_setattr_default_np(&huge), 0);
+  EXPECT_THROW(std::thread([] {}).detach(), std::system_error);
+  size_t frames = 0;
+  evaluateFrames(dataset, none, {}, 4, [&](FrameEvaluation&&) { ++frames; });
+  EXPECT_EQ(pthread_setattr_default_np(&usual), 0);
+  EXPECT_EQ(frames, 5U);
+}
+#endif
 
 TEST_F(DatasetEvaluation, BuiltInDetectorFindsAStep) {
   writeDataset(data, exampleLabels(2));

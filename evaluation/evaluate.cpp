@@ -426,6 +426,10 @@ void EvaluationOptions::check() const {
   if (rho_px.empty()) {
     throw std::invalid_argument("rho_px is empty, at least one tolerance is needed");
   }
+  if (rho_px.size() > kMaxTolerances) {
+    throw std::invalid_argument(fmt::format(
+        "rho_px has {} tolerances, at most {} are allowed", rho_px.size(), kMaxTolerances));
+  }
   for (size_t i = 0; i < rho_px.size(); ++i) {
     if (!(rho_px[i] > 0 && rho_px[i] <= 100)) {
       refuse("rho_px", rho_px[i], "(0, 100]");

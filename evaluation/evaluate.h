@@ -24,9 +24,13 @@ inline constexpr double kSharedEndPx = 0.5;
 /// Around a shared end point, the labels that meet there do not crowd each other.
 inline constexpr double kSharedEndRadiusPx = 15;
 
+/// Tolerances in one evaluation at most; the report's page keeps a bit for each.
+inline constexpr size_t kMaxTolerances = 8;
+
 struct EvaluationOptions {
-  std::vector<double> rho_px{1, 2, 4};  ///< Tolerances, ascending, each in (0, 100].
-  double headline_contrast = 20;        ///< 8-bit grey levels.
+  /// Tolerances, ascending, each in (0, 100]; 1 to kMaxTolerances of them.
+  std::vector<double> rho_px{1, 2, 4};
+  double headline_contrast = 20;  ///< 8-bit grey levels.
   double headline_angle_rad = 5 * M_PI / 180;
   double headline_length_px = 40;
   double crowded_px = 6;  ///< Labels nearer than this to another one are "crowded".

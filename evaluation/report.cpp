@@ -341,6 +341,21 @@ std::optional<std::string> dataFrom(const fs::path& out, const fs::path& data) {
   return std::nullopt;
 }
 
+/// What the dataset shows: "room" of its preset's version "room/1"; empty if its manifest does not
+/// say.
+std::string sceneOf(const ordered_json& manifest) {
+  const auto config = manifest.find("config");
+  if (config == manifest.end() || !config->is_object()) {
+    return "";
+  }
+  const auto scene = config->find("scene");
+  if (scene == config->end() || !scene->is_string()) {
+    return "";
+  }
+  const auto version = scene->get<std::string>();
+  return version.substr(0, version.rfind('/'));
+}
+
 fs::path resolved(const std::string& path) {
   fs::path absolute = fs::weakly_canonical(fs::absolute(path)).lexically_normal();
   return absolute.has_filename() ? absolute : absolute.parent_path();  // no slash at the end
@@ -412,14 +427,20 @@ Report writeReport(const Dataset& dataset,
                                {"script", script}});
   }
 
-  const std::string title = data.filename().string();
+  const std::string scene = sceneOf(dataset.manifest());
+  const std::string folder = data.filename().string();
+  const std::string title = fmt::format("{}, {} frame{}",
+                                        scene.empty() ? folder : scene,
+                                        frames.size(),
+                                        frames.size() == 1 ? "" : "s");
   std::string page = fmt::format(
       "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\n<meta name=\"viewport\" "
       "content=\"width=device-width, initial-scale=1\">\n<title>{} - dlsd "
-      "report</title>\n<style>{}</style></head>\n<body><main>\n<h1>{}</h1>\n",
+      "report</title>\n<style>{}</style></head>\n<body><main>\n<h1>{}{}</h1>\n",
       escapedHtml(title),
       kReportStyle,
-      escapedHtml(title));
+      escapedHtml(title),
+      scene.empty() ? "" : "<small>" + escapedHtml(folder) + "</small>");
   page += detections ? fmt::format("<p>Detections: {}</p>\n", escapedHtml(options.detections_title))
                      : "<p>Labels only</p>\n";
   page += summaryHtml(summary, detections.has_value());

@@ -57,11 +57,22 @@ TEST_F(ReportTest, PageHasAFrameEachAndTheSummary) {
 
 TEST_F(ReportTest, TextIsEscapedAndNothingComesFromElsewhere) {
   const std::string page = readFile(write(data + "/gallery").index_path);
-  EXPECT_THAT(page, HasSubstr("<h1>a &lt;b&gt; &amp; &#39;c&#39;</h1>"));
+  EXPECT_THAT(page, HasSubstr("<h1>a &lt;b&gt; &amp; &#39;c&#39;, 3 frames</h1>"));
   EXPECT_THAT(page, HasSubstr("&lt;x&gt;.jsonl"));
   EXPECT_THAT(page, Not(HasSubstr("<b> &")));
   EXPECT_THAT(page, Not(HasSubstr("https:")));
   EXPECT_THAT(page, Not(HasSubstr("src=\"/")));
+}
+
+TEST_F(ReportTest, TitleTellsTheSceneAndTheNumberOfFrames) {
+  auto manifest = nlohmann::ordered_json::parse(readFile(data + "/manifest.json"));
+  manifest["config"] = {{"scene", "r<oo>m/1"}};
+  writeFileAtomically(data + "/manifest.json", manifest.dump());
+  const std::string page = readFile(write(data + "/gallery").index_path);
+  EXPECT_THAT(page, HasSubstr("<title>r&lt;oo&gt;m, 3 frames - dlsd report</title>"));
+  EXPECT_THAT(
+      page,
+      HasSubstr("<h1>r&lt;oo&gt;m, 3 frames<small>a &lt;b&gt; &amp; &#39;c&#39;</small></h1>"));
 }
 
 TEST_F(ReportTest, ImagesAreReferredToWhenNearAndCopiedWhenFar) {
