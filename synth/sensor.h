@@ -36,8 +36,9 @@ struct SensorOptions {
 [[nodiscard]] double greyLevel(const SensorOptions& sensor, double radiance);
 
 /// Gaussian blur of `radiance` (width * height, row-major) in place of optical spread. The image is
-/// continued by its border pixels; pixels with valid == 0 (no ray: black) count as the black they
-/// are. The kernel is the Gaussian sampled at whole pixels, cut at 4 sigma and normalised.
+/// continued by its border pixels; pixels without a ray (renderRadiance gives them 0) count as the
+/// black they are. The kernel is the Gaussian sampled at whole pixels, cut at 4 sigma and
+/// normalised.
 void blur(const SensorOptions& sensor, int width, int height, std::vector<float>* radiance);
 
 /// Encodes blurred radiance to 8 bits, with noise from (seed, index, pixel).

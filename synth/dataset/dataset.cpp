@@ -46,6 +46,7 @@ Dataset::Dataset(const std::string& folder) : folder_(folder) {
       }
     }
     label_paths_.push_back(frame["labels"].text());
+    image_paths_.push_back(frame["image"].text());
   }
   manifest_ = nlohmann::ordered_json::parse(readFile(path));
 }
@@ -55,6 +56,16 @@ LabelRecord Dataset::labels(size_t i) const {
   LabelRecord record = labelRecordFromJson(parseJson(readFile(path), path), path);
   if (!cameras_.contains(record.camera)) {
     throw InputError(path + ": camera = \"" + record.camera + "\" is not in the manifest");
+  }
+  if (record.image != image_paths_.at(i)) {
+    throw InputError(path + ": image = \"" + record.image + "\" must be \"" + image_paths_[i] +
+                     "\", as the manifest says");
+  }
+  const Camera& cam = camera(record);
+  if (record.width != cam.width() || record.height != cam.height()) {
+    throw InputError(path + ": width and height = " + std::to_string(record.width) + "x" +
+                     std::to_string(record.height) + " must be those of the camera, " +
+                     std::to_string(cam.width()) + "x" + std::to_string(cam.height()));
   }
   return record;
 }

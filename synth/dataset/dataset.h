@@ -26,7 +26,8 @@ class Dataset {
   [[nodiscard]] size_t size() const { return label_paths_.size(); }
   [[nodiscard]] const nlohmann::ordered_json& manifest() const { return manifest_; }
 
-  /// Labels of frame i, in manifest order.
+  /// Labels of frame i, in manifest order. Throws InputError if the record is of another image than
+  /// the manifest says, or does not fit its camera.
   [[nodiscard]] LabelRecord labels(size_t i) const;
   /// Camera of a record (record.camera names it).
   [[nodiscard]] const Camera& camera(const LabelRecord& record) const;
@@ -36,7 +37,7 @@ class Dataset {
  private:
   std::string folder_;
   nlohmann::ordered_json manifest_;
-  std::vector<std::string> label_paths_;
+  std::vector<std::string> label_paths_, image_paths_;
   std::map<std::string, Camera> cameras_;
 };
 

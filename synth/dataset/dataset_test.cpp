@@ -2,10 +2,14 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
+#include <opencv2/core.hpp>
+#include <opencv2/imgcodecs.hpp>
 
+#include "cameras/calibration/calibration.h"
 #include "cameras/calibration/files.h"
 #include "synth/dataset/json_fields.h"
 #include "synth/dataset/statistics.h"
@@ -234,6 +238,102 @@ TEST(Images, RefuseWhatIsNone) {
       EXPECT_NE(std::string(e.what()).find(file.path()), std::string::npos);
     }
   }
+}
+
+/// Whether readImage takes the bytes; a refusal must name the file in one line.
+bool reads(const std::string& content) {
+  const TempFile file(content);
+  try {
+    (void)readImage(file.path());
+    return true;
+  } catch (const InputError& e) {
+    const std::string message = e.what();
+    EXPECT_NE(message.find(file.path()), std::string::npos) << message;
+    EXPECT_EQ(message.find('\n'), std::string::npos) << message;
+    return false;
+  }
+}
+
+TEST(Images, RefusePngThatIsNotWhole) {
+  Image image{40, 30, 3, 8, std::vector<uint8_t>(40 * 30 * 3)};
+  for (size_t i = 0; i < image.bytes.size(); ++i) image.bytes[i] = static_cast<uint8_t>(i * i);
+  const std::string png = encodePng(image);
+  EXPECT_TRUE(reads(png));
+  EXPECT_TRUE(reads(png + "something after it"));
+  testing::internal::CaptureStderr();
+  for (size_t size = 0; size < png.size(); size += 7) EXPECT_FALSE(reads(png.substr(0, size)));
+  for (size_t at = 0; at < png.size(); at += 11) {
+    std::string damaged = png;
+    damaged[at] = static_cast<char>(damaged[at] ^ 0x55);
+    EXPECT_FALSE(reads(damaged)) << at;
+  }
+  EXPECT_EQ(testing::internal::GetCapturedStderr(), "");
+}
+
+TEST(Images, RefuseTruncatedJpeg) {
+  cv::Mat picture(60, 80, CV_8UC1);
+  for (int y = 0; y < picture.rows; ++y) {
+    for (int x = 0; x < picture.cols; ++x) {
+      picture.at<uint8_t>(y, x) = static_cast<uint8_t>(x * 3 + (x * x * 7 + y * y * 13) % 50);
+    }
+  }
+  for (const int progressive : {0, 1}) {
+    std::vector<uint8_t> encoded;
+    ASSERT_TRUE(cv::imencode(".jpg",
+                             picture,
+                             encoded,
+                             {cv::IMWRITE_JPEG_PROGRESSIVE,
+                              progressive,
+                              cv::IMWRITE_JPEG_RST_INTERVAL,
+                              progressive == 0 ? 2 : 0}));
+    const std::string jpeg(encoded.begin(), encoded.end());
+    EXPECT_TRUE(reads(jpeg));
+    EXPECT_TRUE(reads(jpeg + std::string(5000, 'x')));
+    testing::internal::CaptureStderr();
+    for (size_t size = 0; size < jpeg.size(); size += 13) {
+      EXPECT_FALSE(reads(jpeg.substr(0, size))) << size;
+    }
+    EXPECT_FALSE(reads(jpeg.substr(0, jpeg.size() - 1)));
+    EXPECT_EQ(testing::internal::GetCapturedStderr(), "");
+  }
+}
+
+// A folder that somebody else made: a record must be of the image that the manifest names, and of
+// its camera's size.
+TEST(DatasetFolder, RefusesRecordsThatDoNotFit) {
+  namespace fs = std::filesystem;
+  const std::string folder = testing::TempDir() + "dlsd_dataset_test_folder";
+  fs::remove_all(folder);
+  for (const char* name : {"images", "labels", "cameras"})
+    fs::create_directories(folder + "/" + name);
+  const std::array<double, 4> params{300, 300, 319.5, 239.5};
+  const Camera camera = makeCamera("pinhole", params, 640, 480);
+  LabelRecord record = sampleRecord();
+  writeFileAtomically(folder + "/" + record.camera, kalibrYaml({{"cam0", camera}}));
+  writeFileAtomically(folder + "/" + record.image, "never read");
+  writeFileAtomically(folder + "/manifest.json",
+                      json{{"format", kDatasetFormat},
+                           {"cameras", {{{"file", record.camera}}}},
+                           {"frames", {{{"image", record.image}, {"labels", "labels/7.json"}}}}}
+                          .dump());
+  const auto says = [&](const LabelRecord& r) -> std::string {
+    writeFileAtomically(folder + "/labels/7.json", toJson(r).dump());
+    const Dataset data(folder);
+    try {
+      (void)data.labels(0);
+    } catch (const InputError& e) {
+      return e.what();
+    }
+    return "accepted";
+  };
+  EXPECT_EQ(says(record), "accepted");
+  LabelRecord other = record;
+  other.image = "../../etc/passwd";
+  EXPECT_NE(says(other).find("7.json: image = \"../../etc/passwd\" must be"), std::string::npos);
+  other = record;
+  other.height = 481;
+  EXPECT_NE(says(other).find("640x481 must be those of the camera, 640x480"), std::string::npos);
+  fs::remove_all(folder);
 }
 
 TEST(Sha256, IsTheStandardOne) {

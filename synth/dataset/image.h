@@ -16,7 +16,8 @@ struct Image {
 };
 
 /// Reads PNG, JPEG, TIFF, PGM, ... at 8 or 16 bit, 1, 3 or 4 channels, never rotated by EXIF.
-/// Throws InputError naming the file if it is missing or can't be decoded.
+/// Throws InputError naming the file if it is missing, can't be decoded, or is a PNG or JPEG that
+/// is truncated (JPEG: no end-of-image marker) or damaged (PNG: a wrong checksum).
 [[nodiscard]] Image readImage(const std::string& path);
 
 /// PNG bytes (deterministic). Throws SystemError if encoding fails.
