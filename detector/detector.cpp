@@ -1,5 +1,6 @@
 #include "detector/detector.h"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -88,6 +89,57 @@ double curveLengthPx(const Camera& camera, const Arc& arc) {
   return length;
 }
 
+/// Whether the ray's projection onto the arc's plane is on the arc itself, not on the rest of the
+/// great circle.
+bool isOnArc(const Arc& arc, const Eigen::Vector3d& ray) {
+  const double way = arc.normal.dot(arc.from.cross(arc.to)) < 0 ? -1 : 1;
+  return way * arc.normal.dot(arc.from.cross(ray)) >= 0 &&
+         way * arc.normal.dot(ray.cross(arc.to)) >= 0;
+}
+
+/// How far an arc stays in image and domain when walked from fraction t_from, which is inside,
+/// towards t_to. Steps are short against the distance to the image border, at least kStepPx.
+double lastInside(const Camera& camera, const Arc& arc, double t_from, double t_to) {
+  constexpr double kStepPx = 1;
+  constexpr double kSmallestStep = 1e-9;
+  const auto inside = [&](double t) {
+    const auto pixel = camera.project(arc.at(t));
+    return pixel && camera.inImage(*pixel) ? pixel : std::nullopt;
+  };
+  std::optional<Eigen::Vector2d> here = inside(t_from);
+  double t = t_from, step = (t_to - t_from) / 8;
+  while (here && t != t_to) {
+    if (std::abs(step) >= std::abs(t_to - t)) step = t_to - t;
+    const double next_t = step == t_to - t ? t_to : t + step;
+    const auto next = inside(next_t);
+    const double border_px = std::min({here->x() + 0.5,
+                                       camera.width() - 0.5 - here->x(),
+                                       here->y() + 0.5,
+                                       camera.height() - 0.5 - here->y()});
+    if (next && (*next - *here).norm() <= std::max(kStepPx, border_px / 2)) {
+      t = next_t;
+      here = next;
+      step *= 2;
+    } else {
+      step /= 2;
+      if (!(std::abs(step) > kSmallestStep)) break;
+    }
+  }
+  return t;
+}
+
+/// The part of the arc around its middle whose image stays in image and domain. No value if there
+/// is none.
+std::optional<Arc> clippedToImage(const Camera& camera, const Arc& arc) {
+  constexpr double kMiddle = 0.5;
+  const double t0 = lastInside(camera, arc, kMiddle, 0), t1 = lastInside(camera, arc, kMiddle, 1);
+  if (!(t1 > t0)) return std::nullopt;
+  Arc clipped = arc;
+  if (t0 > 0) clipped.from = arc.at(t0);
+  if (t1 < 1) clipped.to = arc.at(t1);
+  return clipped;
+}
+
 }  // namespace
 
 struct Detector::Impl {
@@ -110,9 +162,11 @@ struct Detector::Impl {
   void collectSeeds();
   void traceSeeds();
   void addPolygon(std::span<const Eigen::Vector2d> pixels, std::span<const StraightPiece> group);
-  /// Appends a line for the caller to complete; null if an end of the fitted arc does not project.
+  /// Appends a line for the caller to complete: what the image shows of the fitted plane from end
+  /// to end by way of the middle ray. Null if that is nothing, or a half turn or more: no 3D line.
   DetectedLine* addLine(const PlaneFit& fit,
                         const Eigen::Vector3d& from_ray,
+                        const Eigen::Vector3d& middle_ray,
                         const Eigen::Vector3d& to_ray);
   [[nodiscard]] bool isClaimed(ChainPixel p) const { return claimed[field.at(p.x, p.y)] != 0; }
   void claim(const std::vector<uint32_t>& pixels, const std::vector<uint8_t>& along_x);
@@ -144,8 +198,11 @@ struct Detector::Impl {
 
 DetectedLine* Detector::Impl::addLine(const PlaneFit& fit,
                                       const Eigen::Vector3d& from_ray,
+                                      const Eigen::Vector3d& middle_ray,
                                       const Eigen::Vector3d& to_ray) {
-  const auto arc = arcOnPlane(fit.normal, from_ray, to_ray);
+  const auto traced = arcOnPlane(fit.normal, from_ray, to_ray);
+  if (!traced || !isOnArc(*traced, middle_ray)) return nullptr;
+  const auto arc = clippedToImage(camera, *traced);
   if (!arc) return nullptr;
   const auto from_px = camera.project(arc->from), to_px = camera.project(arc->to);
   if (!from_px || !to_px) return nullptr;
@@ -197,7 +254,8 @@ void Detector::Impl::addPolygon(std::span<const Eigen::Vector2d> pixels,
     alignment.add(gx, gy, curve.normal, true);
     side += gx * curve.normal.x() + gy * curve.normal.y();
   }
-  DetectedLine* line = addLine(*fit, group_rays.front(), group_rays.back());
+  DetectedLine* line =
+      addLine(*fit, group_rays.front(), group_rays[group_rays.size() / 2], group_rays.back());
   if (line == nullptr) return;
   const double count = end - begin;
   line->rms_px = std::sqrt(sum2 / count);
@@ -298,10 +356,9 @@ void Detector::Impl::traceSeeds() {
     size_t shared = 0;
     for (const uint32_t pixel : tracer.crestPixels()) shared += claimed[pixel];
     if (2 * shared >= tracer.crestPixels().size()) continue;
-    claim(tracer.crestPixels(), tracer.crestAlongX());
-
-    DetectedLine* line = addLine(traced->fit, traced->from_ray, traced->to_ray);
+    DetectedLine* line = addLine(traced->fit, traced->from_ray, traced->middle_ray, traced->to_ray);
     if (line == nullptr) continue;
+    claim(tracer.crestPixels(), tracer.crestAlongX());
     line->rms_px = traced->rms_px;
     line->max_px = traced->max_px;
     line->length_px = traced->length_px;

@@ -24,7 +24,9 @@ struct DetectorOptions;  // detector/options.h
 
 /// A straight 3D line seen in the image.
 struct DetectedLine {
-  Arc arc;                         ///< Fitted plane and end rays, camera frame.
+  /// Fitted plane and end rays, camera frame. Less than half a turn, its image curve inside the
+  /// image and the domain.
+  Arc arc;
   Eigen::Vector2d from_px, to_px;  ///< Projections of arc.from and arc.to.
   Eigen::Matrix3d normal_cov;      ///< Covariance of arc.normal (rank 2), from the residuals.
   double rms_px = 0, max_px = 0;   ///< Reprojection residuals (paper's Eq. 8) of the edge pixels.

@@ -182,6 +182,88 @@ TEST_P(DetectorOnScenes, PolarityTellsTheBrighterSide) {
   }
 }
 
+/// Everything that is promised about where a reported line lies.
+void expectInsideImage(const Camera& camera, const std::vector<DetectedLine>& lines) {
+  for (const DetectedLine& line : lines) {
+    EXPECT_LT(line.arc.angle(), M_PI - 1e-3);
+    EXPECT_TRUE(camera.inImage(line.from_px) && camera.inImage(line.to_px));
+    constexpr int kSamples = 400;
+    for (int k = 0; k <= kSamples; ++k) {
+      const auto p = camera.project(line.arc.at(static_cast<double>(k) / kSamples));
+      ASSERT_TRUE(p.has_value());
+      EXPECT_GE(p->x(), -1);
+      EXPECT_LE(p->x(), camera.width());
+      EXPECT_GE(p->y(), -1);
+      EXPECT_LE(p->y(), camera.height());
+    }
+  }
+}
+
+// Cameras that see nearly everything, fold strongly or have an odd image: random scenes with noise,
+// at both ends of what the options allow.
+TEST(Detector, LinesStayInImageAndDomain) {
+  std::vector<Camera> cameras;
+  for (const auto& [w, h] : {std::pair{200, 500}, {500, 200}, {60, 700}, {300, 300}}) {
+    const double cx = 0.45 * w, cy = 0.495 * h;
+    const double f = 0.125 * std::max(w, h);
+    cameras.push_back(makeCamera("fov", std::array{f, 1.03 * f, cx, cy, 0.515}, w, h));
+    cameras.push_back(makeCamera("fov", std::array{f, f, cx, cy, 0.95}, w, h));
+    cameras.push_back(makeCamera("pinhole", std::array{f / 2, f / 2, cx, cy}, w, h));
+    cameras.push_back(makeCamera("kannala_brandt", std::array{f, f, cx, cy, 0., 0., 0., 0.}, w, h));
+    for (const double xi : {0.8, 1.0, 1.3, 3.0}) {
+      cameras.push_back(
+          makeCamera("omni", std::array{xi, f * (1 + xi), f * (1 + xi), cx, cy}, w, h));
+    }
+  }
+  DetectorOptions loose;
+  loose.validation.rho_px = loose.validation.tight_rho_px = 3;
+  loose.validation.max_gap_px = 40;
+  loose.validation.min_score = -100;
+  loose.validation.min_bend_radius_px = 0;
+  loose.planes.max_err_px = 3;
+  size_t lines = 0;
+  for (size_t c = 0; c < cameras.size(); ++c) {
+    const Camera& camera = cameras[c];
+    const Scene scene = test::randomScene(c + 50, 14, 2, M_PI);
+    const auto clean = test::render(scene, camera);
+    for (const auto& options : {DetectorOptions{}, loose, DetectorOptions::paper()}) {
+      Detector detector(camera, options);
+      for (const double noise : {1.0, 12.0}) {
+        const auto image = test::toU8(clean, noise, c);
+        const auto& found = detector.detect(test::viewOf(image, camera));
+        SCOPED_TRACE(testing::Message() << "camera " << c << " noise " << noise);
+        expectInsideImage(camera, found);
+        lines += found.size();
+      }
+    }
+  }
+  EXPECT_GE(lines, 1000U);
+}
+
+// Faint edges full of gaps, where a trace may begin in a gap: its ends are edge points all the
+// same.
+TEST(Detector, LengthIsThatOfTheCurveOnFaintEdges) {
+  DetectorOptions options;
+  options.validation.min_score = -100;
+  size_t lines = 0;
+  for (const auto& [name, camera] : test::testCameras(70)) {
+    for (uint64_t seed = 0; seed < 4; ++seed) {
+      Scene scene = test::randomScene(seed, 9, 0, sceneAngle(camera));
+      for (auto& shape : scene.shapes) shape.grey = scene.background + (shape.grey - 128) / 8;
+      const auto image = test::toU8(test::render(scene, camera), 12, seed);
+      Detector detector(camera, options);
+      for (const auto& line : detector.detect(test::viewOf(image, camera))) {
+        ++lines;
+        double length = 0;
+        const auto curve = test::curveOf(camera, line);
+        for (size_t i = 1; i < curve.size(); ++i) length += (curve[i] - curve[i - 1]).norm();
+        EXPECT_NEAR(line.length_px, length, 3 + 0.02 * length) << name << " " << seed;
+      }
+    }
+  }
+  EXPECT_GE(lines, 50U);
+}
+
 TEST(Detector, EndsAndPlanesAreExactOnACleanPolygon) {
   for (const auto& [name, camera] : test::testCameras()) {
     Scene scene;
@@ -198,13 +280,14 @@ TEST(Detector, EndsAndPlanesAreExactOnACleanPolygon) {
       for (const auto& line : lines) {
         if (angleBetweenPlanes(line.arc.normal, side->normal) > 0.05) continue;
         ++matches;
-        // 0.05 px over arcs of 100 px and more.
-        EXPECT_LE(angleBetweenPlanes(line.arc.normal, side->normal), 1e-3) << name;
-        EXPECT_LE(line.rms_px, 0.1) << name;
+        // Measured: 1e-6 ... 2.1e-4 rad, 0.032 px; ends 2.6 px from the corners, which the optical
+        // blur and the smoothing round off.
+        EXPECT_LE(angleBetweenPlanes(line.arc.normal, side->normal), 3e-4) << name;
+        EXPECT_LE(line.rms_px, 0.04) << name;
         const auto a = camera.project(side->from), b = camera.project(side->to);
-        const double straight = (line.from_px - *a).norm() + (line.to_px - *b).norm();
-        const double crossed = (line.from_px - *b).norm() + (line.to_px - *a).norm();
-        EXPECT_LE(std::min(straight, crossed), 6) << name;
+        const bool crossed = (line.from_px - *a).norm() > (line.from_px - *b).norm();
+        EXPECT_LE((line.from_px - (crossed ? *b : *a)).norm(), 3) << name;
+        EXPECT_LE((line.to_px - (crossed ? *a : *b)).norm(), 3) << name;
       }
       EXPECT_EQ(matches, 1) << name;
     }
@@ -378,10 +461,11 @@ TEST(Detector, FlatImagesAndCamerasWithoutRaysGiveNothing) {
   EXPECT_THAT(Detector(blind).detect(test::viewOf(image, blind)), testing::IsEmpty());
 }
 
-TEST(Detector, ExtremeImagesDoNotOverflow) {
+TEST(Detector, ExtremeImagesGiveFiniteRecords) {
   // Full contrast in checks, stripes, spirals and noise: the most edges that an image can hold.
   const Camera camera = test::testCameras(40)[2].camera;
   const int w = camera.width(), h = camera.height();
+  size_t paper_lines = 0, unchecked_lines = 0;
   for (int kind = 0; kind < 8; ++kind) {
     std::vector<uint8_t> image(static_cast<size_t>(w * h));
     for (int y = 0; y < h; ++y) {
@@ -414,13 +498,24 @@ TEST(Detector, ExtremeImagesDoNotOverflow) {
         options.validation.min_bend_radius_px = 0;
       }
       Detector detector(camera, options);
-      for (const auto& line : detector.detect(test::viewOf(image, camera))) {
+      const auto& lines = detector.detect(test::viewOf(image, camera));
+      if (options.method == DetectorOptions::Method::kConvexPolygons) {
+        paper_lines += lines.size();
+      } else if (kind == 7) {
+        unchecked_lines += lines.size();
+      } else {
+        EXPECT_LE(lines.size(), 3U) << kind;  // nothing there is straight in space
+      }
+      for (const auto& line : lines) {
         EXPECT_TRUE(line.arc.normal.allFinite() && line.normal_cov.allFinite());
         EXPECT_TRUE(std::isfinite(line.score) && std::isfinite(line.rms_px));
         EXPECT_TRUE(std::isfinite(line.max_px) && line.length_px > 0);
       }
+      expectInsideImage(camera, lines);
     }
   }
+  EXPECT_GE(paper_lines, 50U);
+  EXPECT_GE(unchecked_lines, 200U);
 }
 
 TEST(Detector, WrongViewsAreRefusedWithBothSizes) {
@@ -483,27 +578,31 @@ TEST(DetectorOptions, OutOfRangeIsNamed) {
   EXPECT_FALSE(paper.edges.subpixel);
 }
 
+// An edge from x = 35 to 365 px of a pinhole image with a bend at 290 px: two straight pieces, one
+// convex chain, judged as a whole (4.4). The line that fits it best leaves the ends of the pieces
+// at 13, 21, 21 and 45 px times the bend (rad): with 0.1 rad one of the four is beyond rho = 4 px.
 TEST(Detector, PaperDropsAChainWithOneBadEnd) {
-  // In the paper mode an arc that no plane fits within rho is dropped as a whole: a circle of
-  // radius 100 px makes convex polygons of up to a full turn, and none survives rho = 0.5 px with
-  // more length than a great circle fits.
   const Camera camera = makeCamera("pinhole", std::array{400.0, 400.0, 200.0, 200.0}, 400, 400);
-  std::vector<uint8_t> image(400 * 400);
-  for (int y = 0; y < 400; ++y) {
-    for (int x = 0; x < 400; ++x) {
-      const double d = 100 - std::hypot(x - 200.3, y - 199.8);
-      image[static_cast<size_t>(y * 400 + x)] = static_cast<uint8_t>(60 + 60 * std::erfc(-d / 1.1));
+  const auto linesAt = [&](double bend_rad, double rho_px) {
+    std::vector<uint8_t> image(400 * 400);
+    for (int y = 0; y < 400; ++y) {
+      for (int x = 0; x < 400; ++x) {
+        const double edge_y = 200.3 - std::max(0.0, x - 290.0) * std::tan(bend_rad);
+        // The contrast fades away at both ends: no other edge bounds the bright part.
+        const double contrast = 60 * std::clamp(std::min(x - 30, 370 - x) / 20.0, 0.0, 1.0);
+        image[static_cast<size_t>(y * 400 + x)] =
+            static_cast<uint8_t>(120 + contrast * std::erf((y - edge_y) / 1.1));
+      }
     }
-  }
-  DetectorOptions options = DetectorOptions::paper();
-  for (const double rho_px : {0.5, 1.0}) {
+    DetectorOptions options = DetectorOptions::paper();
     options.validation.rho_px = rho_px;
     Detector detector(camera, options);
-    for (const auto& line : detector.detect(test::viewOf(image, camera))) {
-      // Sagitta of the chord at most 2 rho.
-      EXPECT_LE(line.length_px, 2 * std::sqrt(2 * 100 * 2 * rho_px) + 4);
-    }
-  }
+    return detector.detect(test::viewOf(image, camera)).size();
+  };
+  EXPECT_EQ(linesAt(0, 4), 1U);
+  EXPECT_EQ(linesAt(0.08, 4), 1U);
+  EXPECT_EQ(linesAt(0.10, 4), 0U);
+  EXPECT_EQ(linesAt(0.10, 6), 1U);
 }
 
 }  // namespace

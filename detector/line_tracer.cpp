@@ -248,17 +248,21 @@ std::optional<TracedLine> LineTracer::trace(const GradientField& field,
     extend(field, thresholds.chain, bound_px, -1, &backward_, &back);
     if (!refit()) return std::nullopt;
   }
-  const size_t forward_size = forward_.size(), backward_size = backward_.size();
-  cutTail(&forward_);
-  cutTail(&backward_);
-  // A cut by more than a flaw means that the edge had ended before the border.
-  front.at_border = front.at_border && forward_.size() + kGapPx > forward_size;
-  back.at_border = back.at_border && backward_.size() + kGapPx > backward_size;
-
   // One sequence from the backward end to the forward end.
   std::reverse(backward_.begin(), backward_.end());
   backward_.insert(backward_.end(), forward_.begin(), forward_.end());
-  const std::vector<Step>& steps = backward_;
+  // Cut as a whole: what is left of the start may be no more than a short run beyond a gap.
+  const auto cutEnd = [&](Front* end) {
+    const size_t size = backward_.size();
+    cutTail(&backward_);
+    // A cut by more than a flaw means that the edge had ended before the border.
+    end->at_border = end->at_border && backward_.size() + kGapPx > size;
+  };
+  cutEnd(&front);
+  std::reverse(backward_.begin(), backward_.end());
+  cutEnd(&back);
+  std::reverse(backward_.begin(), backward_.end());
+  const std::vector<Step>& steps = backward_;  // first and last are edges
   if (steps.size() < 2 || static_cast<double>(steps.size()) < options_.min_length_px) {
     return std::nullopt;
   }
@@ -312,6 +316,8 @@ std::optional<TracedLine> LineTracer::trace(const GradientField& field,
   line.to_ray = to.ray;
   line.from_px = from.px;
   line.to_px = to.px;
+  line.middle_ray =
+      rays_.at(steps[steps.size() / 2].curve_px.x(), steps[steps.size() / 2].curve_px.y()).ray;
   line.length_px +=
       (from.px - steps.front().crest_px).norm() + (to.px - steps.back().crest_px).norm();
   return line;

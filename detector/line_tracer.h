@@ -27,6 +27,7 @@ struct TraceSeed {
 struct TracedLine {
   PlaneFit fit;                      ///< Weights in px^-2: squared_residuals is in px^2.
   Eigen::Vector3d from_ray, to_ray;  ///< Rays of the ends (near the plane, not on it).
+  Eigen::Vector3d middle_ray;        ///< Of a point between them: tells which way round.
   Eigen::Vector2d from_px, to_px;    ///< Those ends.
   double length_px;                  ///< Along the curve.
   int edge_points;
