@@ -180,11 +180,11 @@ int run(const Arguments& arguments) {
                       std::filesystem::exists(arguments.out, ignored) ? " and is as before" : "");
     }
   }
-  if (!times.empty()) {
-    tell(table(times));
-  }
   for (const std::string& complaint : complaints) {
     complain(complaint);
+  }
+  if (!times.empty()) {
+    tell(table(times));
   }
   return complaints.empty() ? kDone : kBadInput;
 }
