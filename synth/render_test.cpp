@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include "cameras/calibration/files.h"
 #include "synth/generate.h"
 #include "synth/test_cameras.h"
 
@@ -49,9 +50,8 @@ TEST(CameraRays, InterpolateWithinTheirBound) {
 
 // Where the adaptive image spends one sample, 64 would not have changed it.
 TEST(Render, AdaptiveEqualsSixtyFourSamplesEverywhere) {
-  size_t pixels = 0, off = 0;
-  for (const auto& [name, camera] : testCameras(4)) {
-    if (name == "omni" || name == "pinhole") continue;
+  for (const auto& [name, camera] : testCameras(5)) {
+    size_t pixels = 0, off = 0;
     const CameraRays rays(camera);
     const SceneView view = makeSceneView("room", 200, 1);
     const Raycaster raycaster(view.scene);
@@ -67,11 +67,13 @@ TEST(Render, AdaptiveEqualsSixtyFourSamplesEverywhere) {
                                          static_cast<double>(adaptive.radiance[i]));
       off += difference * 255 > 1 ? 1U : 0U;
     }
+    std::printf("%s: adaptive sampling: %zu of %zu pixels differ by more than 1 grey level\n",
+                name.c_str(),
+                off,
+                pixels);
+    EXPECT_GT(pixels, 50000U) << name;
+    EXPECT_LE(off, pixels / 10000) << name;
   }
-  std::printf(
-      "adaptive sampling: %zu of %zu pixels differ by more than 1 grey level\n", off, pixels);
-  EXPECT_GT(pixels, 150000U);
-  EXPECT_LE(off, pixels / 10000);
 }
 
 /// Least-squares fit of a blurred step a + b x + c erf((x - x0) / (sqrt(2) s)) by Gauss-Newton.
@@ -106,116 +108,125 @@ StepFit fitStep(const std::vector<double>& x,
   return {p[3], std::sqrt(residual.squaredNorm() / static_cast<double>(n)) / (2 * std::abs(p[2]))};
 }
 
-// The noise-free picture has its edges where the labels are. Isolated labels only; steps are fitted
-// row by row (or column by column) and pooled over 10 px.
-TEST(Render, EdgesLieOnTheirLabels) {
-  std::vector<double> errors;
-  size_t fits = 0, poor = 0;
-  for (const auto& named : testCameras(1)) {
-    // Not a structured binding: lambdas below use the camera.
-    const std::string& name = named.first;
-    const Camera& camera = named.second;
-    if (name == "omni" || name == "pinhole") continue;  // Two full pictures keep the test quick.
-    GenerateOptions options;
-    options.cameras = {{name, camera}};
-    options.seed = 300;
-    const Frame frame = renderFrame(options, 1);
-    const auto grey = [&](int x, int y) {
-      return 255 * static_cast<double>(
-                       frame.radiance[static_cast<size_t>(y) * static_cast<size_t>(camera.width()) +
-                                      static_cast<size_t>(x)]);
-    };
-    // Samples of all labels on a grid, to find isolated places.
-    constexpr int kCell = 10;
-    const int columns = camera.width() / kCell + 3;
-    std::vector<std::vector<std::pair<Vector2d, int>>> grid(
-        static_cast<size_t>(columns) * static_cast<size_t>(camera.height() / kCell + 3));
-    const auto cell = [&](double x, double y) {
-      return static_cast<size_t>((static_cast<int>(y) / kCell + 1) * columns +
-                                 static_cast<int>(x) / kCell + 1);
-    };
-    for (const LabelLine& line : frame.labels.lines) {
-      for (size_t i = 1; i < line.points.size(); ++i) {
-        const Vector2d d = line.points[i] - line.points[i - 1];
-        const int steps = static_cast<int>(std::ceil(d.norm()));
-        for (int k = 0; k <= steps; ++k) {
-          const Vector2d p =
-              line.points[i - 1] + d * (steps == 0 ? 0.0 : static_cast<double>(k) / steps);
-          grid[cell(std::max(0.0, p.x()), std::max(0.0, p.y()))].emplace_back(p, line.id);
+/// Where the steps of noise-free pictures are, against the labels.
+struct EdgeErrors {
+  std::vector<double> errors;  ///< px, each pooled over 10 rows or columns.
+  size_t fits = 0, poor = 0;   ///< Single rows or columns.
+};
+
+void measureEdges(const Camera& camera, const Frame& frame, EdgeErrors* out) {
+  const auto grey = [&](int x, int y) {
+    return 255 * static_cast<double>(
+                     frame.radiance[static_cast<size_t>(y) * static_cast<size_t>(camera.width()) +
+                                    static_cast<size_t>(x)]);
+  };
+  // Samples of all labels on a grid, to find isolated places.
+  constexpr int kCell = 10;
+  const int columns = camera.width() / kCell + 3;
+  std::vector<std::vector<std::pair<Vector2d, int>>> grid(
+      static_cast<size_t>(columns) * static_cast<size_t>(camera.height() / kCell + 3));
+  const auto cell = [&](double x, double y) {
+    return static_cast<size_t>((static_cast<int>(y) / kCell + 1) * columns +
+                               static_cast<int>(x) / kCell + 1);
+  };
+  for (const LabelLine& line : frame.labels.lines) {
+    for (size_t i = 1; i < line.points.size(); ++i) {
+      const Vector2d d = line.points[i] - line.points[i - 1];
+      const int steps = static_cast<int>(std::ceil(d.norm()));
+      for (int k = 0; k <= steps; ++k) {
+        const Vector2d p =
+            line.points[i - 1] + d * (steps == 0 ? 0.0 : static_cast<double>(k) / steps);
+        grid[cell(std::max(0.0, p.x()), std::max(0.0, p.y()))].emplace_back(p, line.id);
+      }
+    }
+  }
+  const auto isolated = [&](const Vector2d& p, int id) {
+    for (int dy = -1; dy <= 1; ++dy) {
+      for (int dx = -1; dx <= 1; ++dx) {
+        for (const auto& [q, other] : grid[cell(p.x() + dx * kCell, p.y() + dy * kCell)]) {
+          if (other != id && (p - q).norm() < 9) return false;
         }
       }
     }
-    const auto isolated = [&](const Vector2d& p, int id) {
-      for (int dy = -1; dy <= 1; ++dy) {
-        for (int dx = -1; dx <= 1; ++dx) {
-          for (const auto& [q, other] : grid[cell(p.x() + dx * kCell, p.y() + dy * kCell)]) {
-            if (other != id && (p - q).norm() < 9) return false;
-          }
+    return true;
+  };
+  for (const LabelLine& line : frame.labels.lines) {
+    if (line.kind == LineKind::kWire || line.contrast_min < 30 || line.length_px < 40) continue;
+    // Rows where the line is rather upright, else columns.
+    const Vector2d chord = line.points.back() - line.points.front();
+    const bool rows = std::abs(chord.y()) > std::abs(chord.x());
+    const int along = rows ? 1 : 0, across = 1 - along;
+    double sum = 0;
+    int count = 0;
+    for (size_t i = 1; i < line.points.size(); ++i) {
+      Vector2d a = line.points[i - 1], b = line.points[i];
+      if (a[along] > b[along]) std::swap(a, b);
+      for (int row = static_cast<int>(std::ceil(a[along])); row < b[along]; ++row) {
+        const double t = (row - a[along]) / (b[along] - a[along]);
+        const Vector2d p = a + t * (b - a);
+        if (std::min((p - line.points.front()).norm(), (p - line.points.back()).norm()) < 10)
+          continue;
+        if (p.x() < 14 || p.y() < 14 || p.x() > camera.width() - 15 || p.y() > camera.height() - 15)
+          continue;
+        if (!isolated(p, line.id)) continue;
+        std::vector<double> x, y;
+        const int middle = static_cast<int>(std::lround(p[across]));
+        for (int k = -5; k <= 5; ++k) {
+          x.push_back(middle + k);
+          y.push_back(rows ? grey(middle + k, row) : grey(row, middle + k));
         }
-      }
-      return true;
-    };
-    for (const LabelLine& line : frame.labels.lines) {
-      if (line.kind == LineKind::kWire || line.contrast_min < 30 || line.length_px < 40) continue;
-      // Rows where the line is rather upright, else columns.
-      const Vector2d chord = line.points.back() - line.points.front();
-      const bool rows = std::abs(chord.y()) > std::abs(chord.x());
-      const int along = rows ? 1 : 0, across = 1 - along;
-      double sum = 0;
-      int count = 0;
-      for (size_t i = 1; i < line.points.size(); ++i) {
-        Vector2d a = line.points[i - 1], b = line.points[i];
-        if (a[along] > b[along]) std::swap(a, b);
-        for (int row = static_cast<int>(std::ceil(a[along])); row < b[along]; ++row) {
-          const double t = (row - a[along]) / (b[along] - a[along]);
-          const Vector2d p = a + t * (b - a);
-          if (std::min((p - line.points.front()).norm(), (p - line.points.back()).norm()) < 10)
-            continue;
-          if (p.x() < 14 || p.y() < 14 || p.x() > camera.width() - 15 ||
-              p.y() > camera.height() - 15)
-            continue;
-          if (!isolated(p, line.id)) continue;
-          std::vector<double> x, y;
-          const int middle = static_cast<int>(std::lround(p[across]));
-          for (int k = -5; k <= 5; ++k) {
-            x.push_back(middle + k);
-            y.push_back(rows ? grey(middle + k, row) : grey(row, middle + k));
-          }
-          if (std::abs(y.front() - y.back()) < 25) continue;
-          const double cosine = std::abs((b - a).normalized()[along]);
-          const StepFit fit = fitStep(x, y, p[across], 0.75 / cosine);
-          ++fits;
-          // Round things and faint lines near by spoil a fit; they are not what is tested here.
-          if (!(fit.rms_share < 0.01) || !(std::abs(fit.x0 - p[across]) < 2)) {
-            ++poor;
-            continue;
-          }
-          sum += (fit.x0 - p[across]) * cosine;
-          if (++count == 10) {
-            errors.push_back(std::abs(sum / count));
-            sum = 0;
-            count = 0;
-          }
+        if (std::abs(y.front() - y.back()) < 25) continue;
+        const double cosine = std::abs((b - a).normalized()[along]);
+        const StepFit fit = fitStep(x, y, p[across], 0.75 / cosine);
+        ++out->fits;
+        // Round things and faint lines near by spoil a fit; they are not what is tested here.
+        if (!(fit.rms_share < 0.01) || !(std::abs(fit.x0 - p[across]) < 2)) {
+          ++out->poor;
+          continue;
+        }
+        sum += (fit.x0 - p[across]) * cosine;
+        if (++count == 10) {
+          out->errors.push_back(std::abs(sum / count));
+          sum = 0;
+          count = 0;
         }
       }
     }
   }
-  ASSERT_GT(errors.size(), 200U);
-  std::sort(errors.begin(), errors.end());
-  double mean = 0;
-  for (const double e : errors) mean += e / static_cast<double>(errors.size());
-  std::printf(
-      "edge position: %zu pooled fits (%zu rows, %zu poor), mean |error| %.4f px, 99 %% %.4f px, "
-      "max %.4f px\n",
-      errors.size(),
-      fits,
-      poor,
-      mean,
-      errors[errors.size() * 99 / 100],
-      errors.back());
-  EXPECT_LT(poor, fits / 10);
-  EXPECT_LE(mean, 0.02);
-  EXPECT_LE(errors[errors.size() * 99 / 100], 0.05);
+}
+
+// The noise-free picture has its edges where the labels are. Isolated labels only; steps are fitted
+// row by row (or column by column) and pooled over 10 px.
+TEST(Render, EdgesLieOnTheirLabels) {
+  std::vector<double> all;
+  for (const auto& [name, camera] : testCameras(1)) {
+    GenerateOptions options;
+    options.cameras = {{name, camera}};
+    options.seed = 300;
+    EdgeErrors m;
+    measureEdges(camera, renderFrame(options, 1), &m);
+    ASSERT_GT(m.errors.size(), 100U) << name;
+    std::sort(m.errors.begin(), m.errors.end());
+    double mean = 0;
+    for (const double e : m.errors) mean += e / static_cast<double>(m.errors.size());
+    std::printf(
+        "%s: edge position: %zu pooled fits (%zu rows, %zu poor), mean |error| %.4f px, "
+        "99 %% %.4f px, max %.4f px\n",
+        name.c_str(),
+        m.errors.size(),
+        m.fits,
+        m.poor,
+        mean,
+        m.errors[m.errors.size() * 99 / 100],
+        m.errors.back());
+    EXPECT_LT(m.poor, m.fits / 10) << name;
+    EXPECT_LE(mean, 0.02) << name;
+    all.insert(all.end(), m.errors.begin(), m.errors.end());
+  }
+  // Over all models: of one alone these are two or three values.
+  std::sort(all.begin(), all.end());
+  std::printf("edge position: 99 %% of %zu %.4f px\n", all.size(), all[all.size() * 99 / 100]);
+  EXPECT_LE(all[all.size() * 99 / 100], 0.05);
 }
 
 TEST(Sensor, BlurKeepsLightAndBorder) {
@@ -261,6 +272,28 @@ TEST(Sensor, EncodingsAreMonotoneAndMeetAtTheEnds) {
       EXPECT_GT(greyLevel(sensor, i / 1000.0), greyLevel(sensor, (i - 1) / 1000.0));
     }
   }
+}
+
+TEST(Sensor, SurvivesItsJson) {
+  for (const Encoding encoding : {Encoding::kLinear, Encoding::kSrgb, Encoding::kGamma}) {
+    EXPECT_EQ(encodingFromName(toString(encoding)), encoding);
+    SensorOptions sensor;
+    sensor.psf_sigma_px = 0.3;
+    sensor.exposure = 1.25;
+    sensor.read_noise_levels = 2;
+    sensor.encoding = encoding;
+    sensor.gamma = 1.8;
+    const nlohmann::json json = toJson(sensor);
+    EXPECT_EQ(toJson(sensorFromJson(json, "x")), toJson(sensor));
+    for (const auto& [key, value] : json.items()) {
+      nlohmann::json missing = json, wrong = json;
+      missing.erase(key);
+      wrong[key] = -7;
+      EXPECT_THROW((void)sensorFromJson(missing, "x"), InputError) << key;
+      EXPECT_THROW((void)sensorFromJson(wrong, "x"), InputError) << key;
+    }
+  }
+  EXPECT_FALSE(encodingFromName("rot13"));
 }
 
 TEST(Sensor, RefusesWhatIsOutOfRange) {

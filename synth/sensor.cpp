@@ -1,11 +1,14 @@
 #include "synth/sensor.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <sstream>
 #include <stdexcept>
-#include <string_view>
+#include <utility>
 
+#include "cameras/calibration/files.h"
+#include "synth/dataset/json_fields.h"
 #include "synth/random.h"
 
 namespace dlsd {
@@ -22,17 +25,8 @@ void requireRange(std::string_view name, double value, double lo, double hi) {
   throw std::invalid_argument(message.str());
 }
 
-std::string_view toString(Encoding encoding) {
-  switch (encoding) {
-    case Encoding::kLinear:
-      return "linear";
-    case Encoding::kSrgb:
-      return "srgb";
-    case Encoding::kGamma:
-      return "gamma";
-  }
-  return "";
-}
+constexpr std::array<std::pair<Encoding, std::string_view>, 3> kEncodings{
+    {{Encoding::kLinear, "linear"}, {Encoding::kSrgb, "srgb"}, {Encoding::kGamma, "gamma"}}};
 
 std::vector<float> gaussianKernel(double sigma) {
   const int radius = std::max(1, static_cast<int>(std::ceil(4 * sigma)));
@@ -55,6 +49,39 @@ void SensorOptions::check() const {
   requireRange("exposure", exposure, 1e-3, 1e3);
   requireRange("read_noise_levels", read_noise_levels, 0, 100);
   requireRange("gamma", gamma, 1, 4);
+}
+
+std::string_view toString(Encoding encoding) {
+  for (const auto& [value, name] : kEncodings) {
+    if (value == encoding) return name;
+  }
+  return "";
+}
+
+std::optional<Encoding> encodingFromName(std::string_view wanted) {
+  for (const auto& [value, name] : kEncodings) {
+    if (name == wanted) return value;
+  }
+  return std::nullopt;
+}
+
+SensorOptions sensorFromJson(const nlohmann::json& json, const std::string& source) {
+  const JsonField field(json, source, "sensor");
+  SensorOptions sensor;
+  sensor.psf_sigma_px = field["psf_sigma_px"].number();
+  sensor.exposure = field["exposure"].number();
+  sensor.read_noise_levels = field["read_noise_levels"].number();
+  const auto encoding = encodingFromName(field["encoding"].text());
+  if (!encoding) field["encoding"].fail("must be one of linear, srgb, gamma");
+  sensor.encoding = *encoding;
+  if (sensor.encoding == Encoding::kGamma) sensor.gamma = field["gamma"].number();
+  (void)field["bits"].integer(8, 8);
+  try {
+    sensor.check();
+  } catch (const std::invalid_argument& e) {
+    throw InputError(source + ": " + e.what());
+  }
+  return sensor;
 }
 
 nlohmann::ordered_json toJson(const SensorOptions& sensor) {

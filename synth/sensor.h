@@ -4,7 +4,9 @@
 
 #include <cstdint>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "synth/dataset/image.h"
@@ -29,7 +31,14 @@ struct SensorOptions {
   void check() const;
 };
 
+/// "linear", "srgb", "gamma": the names in files and on the command line.
+[[nodiscard]] std::string_view toString(Encoding encoding);
+[[nodiscard]] std::optional<Encoding> encodingFromName(std::string_view name);
+
 [[nodiscard]] nlohmann::ordered_json toJson(const SensorOptions& sensor);
+/// The inverse of toJson. `source` names the file in messages. Throws InputError for anything
+/// missing, of the wrong type or out of range.
+[[nodiscard]] SensorOptions sensorFromJson(const nlohmann::json& json, const std::string& source);
 
 /// Grey level (0..255, not rounded, clamped as a saturating sensor does) of linear radiance,
 /// without noise. Monotone in the radiance.
