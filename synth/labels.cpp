@@ -6,6 +6,8 @@
 #include <limits>
 #include <optional>
 
+#include "synth/dataset/statistics.h"
+
 namespace dlsd {
 namespace {
 
@@ -274,12 +276,6 @@ EndKind endKind(ImageEnd end) {
 /// To 1e-6 px, a thousandth of the labels' tolerance: files get half as long.
 double roundPixel(double x) {
   return std::round(x * 1e6) / 1e6;
-}
-
-double curveLength(const std::vector<Eigen::Vector2d>& points) {
-  double length = 0;
-  for (size_t i = 1; i < points.size(); ++i) length += (points[i] - points[i - 1]).norm();
-  return length;
 }
 
 /// Width in px of a rod at an angle of its centre line's arc; 0 outside the domain.

@@ -31,12 +31,6 @@ double quantile(std::vector<double> values, double q) {
   return values[i] + (position - static_cast<double>(i)) * (values[j] - values[i]);
 }
 
-double curveLength(const std::vector<Eigen::Vector2d>& points) {
-  double length = 0;
-  for (size_t i = 1; i < points.size(); ++i) length += (points[i] - points[i - 1]).norm();
-  return length;
-}
-
 std::vector<Sample> sampleLines(const LabelRecord& record) {
   std::vector<Sample> samples;
   for (size_t l = 0; l < record.lines.size(); ++l) {
@@ -98,6 +92,12 @@ void countNeighbours(const LabelRecord& record, LabelStatistics* statistics) {
 }
 
 }  // namespace
+
+double curveLength(const std::vector<Eigen::Vector2d>& points) {
+  double length = 0;
+  for (size_t i = 1; i < points.size(); ++i) length += (points[i] - points[i - 1]).norm();
+  return length;
+}
 
 double LabelStatistics::crowdedShare() const {
   return share(crowded_lines, lines);

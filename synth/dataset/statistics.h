@@ -9,6 +9,9 @@
 
 namespace dlsd {
 
+/// Length of a polyline, px.
+[[nodiscard]] double curveLength(const std::vector<Eigen::Vector2d>& points);
+
 struct LabelStatistics {
   size_t frames = 0, lines = 0;
   double median_lines_per_frame = 0;
