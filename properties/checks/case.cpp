@@ -42,25 +42,6 @@ Camera cameraFromJson(const JsonField& json) {
   }
 }
 
-SensorOptions sensorFromJson(const JsonField& json) {
-  SensorOptions sensor;
-  sensor.psf_sigma_px = json["psf_sigma_px"].number();
-  sensor.exposure = json["exposure"].number();
-  sensor.read_noise_levels = json["read_noise_levels"].number();
-  const std::string encoding = json["encoding"].text();
-  if (encoding == "linear") {
-    sensor.encoding = Encoding::kLinear;
-  } else if (encoding == "srgb") {
-    sensor.encoding = Encoding::kSrgb;
-  } else if (encoding == "gamma") {
-    sensor.encoding = Encoding::kGamma;
-    sensor.gamma = json["gamma"].number();
-  } else {
-    json["encoding"].fail("is none of linear, srgb, gamma");
-  }
-  return sensor;
-}
-
 }  // namespace
 
 ordered_json toJson(const FrameCase& frame_case) {
@@ -82,7 +63,7 @@ FrameCase frameCaseFromJson(const nlohmann::json& json, const std::string& sourc
           root["scene"].text(),
           root["seed"].counter(),
           root["index"].counter(),
-          sensorFromJson(root["sensor"]),
+          sensorFromJson(root["sensor"].raw(), source),
           root["detector"].text()};
 }
 
