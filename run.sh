@@ -21,7 +21,7 @@ done
 mkdir -p "$out"
 "$dlsd" generate "${cameras[@]}" --scene room --count 8 --seed 0 --out "$out/data"
 "$dlsd" detect --data "$out/data" --out "$out/detections.jsonl" --overlay "$out/overlays"
-"$dlsd" evaluate --data "$out/data" --detections "$out/detections.jsonl"
+"$dlsd" evaluate --data "$out/data" --detections "$out/detections.jsonl" --rho 2
 "$dlsd" report --data "$out/data" --detections "$out/detections.jsonl" --out "$out/gallery" >/dev/null
 echo
 echo "Images, labels and cameras:  $out/data"
