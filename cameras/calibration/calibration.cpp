@@ -29,8 +29,6 @@ constexpr std::array<KalibrModel, 4> kKalibrModels{{
     {"pinhole", "equidistant", KannalaBrandt::kName, 4},
     {"omni", "none", UnifiedOmni::kName, 5},
 }};
-static_assert(kKalibrModels.size() == std::variant_size_v<CameraModelVariant>,
-              "every model needs its names in Kalibr files");
 
 /// Keys of Kalibr that say nothing about the intrinsics.
 constexpr std::array<std::string_view, 5> kIgnoredKeys{
@@ -308,6 +306,14 @@ std::vector<NamedCamera> loadCameras(const std::string& path) {
   return cameras;
 }
 
+LoadedCalibration loadCalibration(const std::string& path, const std::string& format) {
+  if (!format.empty() && format != "kalibr") {
+    throw InputError(path + ": unknown calibration format " + inQuotes(format) +
+                     ", allowed is kalibr");
+  }
+  return {"kalibr", "integer coordinates are pixel centres, read as they are", loadCameras(path)};
+}
+
 Camera loadCamera(const std::string& path_or_path_and_name) {
   std::string path = path_or_path_and_name, name;
   std::error_code ignored;
@@ -348,6 +354,10 @@ std::string kalibrYaml(const std::vector<NamedCamera>& cameras) {
         std::find_if(kKalibrModels.begin(), kKalibrModels.end(), [&](const KalibrModel& m) {
           return m.name == camera.modelName();
         });
+    if (known == kKalibrModels.end()) {
+      throw std::invalid_argument(name + ": a camchain cannot say the model " +
+                                  std::string(camera.modelName()));
+    }
     const std::vector<double> params = camera.params();
     const auto list = [&](size_t begin, size_t end) {
       std::string out = "[";

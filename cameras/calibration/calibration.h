@@ -13,6 +13,19 @@ struct NamedCamera {
   Camera camera;
 };
 
+struct LoadedCalibration {
+  std::string format;  ///< "kalibr".
+  std::string
+      pixel_convention;  ///< What the file's pixel coordinates mean, and how they were read.
+  std::vector<NamedCamera> cameras;  ///< In file order, at least one.
+};
+
+/// A calibration file, and how it was understood.
+/// @param format  "" recognises the format by the file's content.
+/// Throws InputError as loadCameras.
+[[nodiscard]] LoadedCalibration loadCalibration(const std::string& path,
+                                                const std::string& format = "");
+
 /// All cameras of a calibration file, in file order.
 /// Throws InputError (files.h) with file, key, value and allowed range for anything missing,
 /// unknown, truncated, ambiguous or out of range; nothing is guessed.
