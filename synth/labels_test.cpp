@@ -8,7 +8,7 @@
 #include <cstdio>
 #include <limits>
 
-#include "synth/random.h"
+#include "synth/dataset/random.h"
 #include "synth/render.h"
 #include "synth/scene_builder.h"
 #include "synth/test_cameras.h"

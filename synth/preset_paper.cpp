@@ -5,8 +5,8 @@
 #include <array>
 #include <cmath>
 
+#include "synth/dataset/random.h"
 #include "synth/presets.h"
-#include "synth/random.h"
 #include "synth/scene_builder.h"
 
 namespace dlsd {

@@ -6,8 +6,8 @@
 #include <cmath>
 #include <vector>
 
+#include "synth/dataset/random.h"
 #include "synth/presets.h"
-#include "synth/random.h"
 #include "synth/scene_builder.h"
 
 namespace dlsd {

@@ -10,8 +10,8 @@
 #include <cmath>
 #include <optional>
 
+#include "synth/dataset/random.h"
 #include "synth/presets.h"
-#include "synth/random.h"
 #include "synth/scene_builder.h"
 #include "synth/shading.h"
 

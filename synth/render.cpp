@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "cameras/batch.h"
-#include "synth/random.h"
+#include "synth/dataset/random.h"
 
 namespace dlsd {
 namespace {

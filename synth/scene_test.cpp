@@ -8,7 +8,7 @@
 #include <map>
 #include <set>
 
-#include "synth/random.h"
+#include "synth/dataset/random.h"
 
 namespace dlsd {
 namespace {

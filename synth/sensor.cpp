@@ -9,7 +9,7 @@
 
 #include "cameras/calibration/files.h"
 #include "synth/dataset/json_fields.h"
-#include "synth/random.h"
+#include "synth/dataset/random.h"
 
 namespace dlsd {
 namespace {
