@@ -10,6 +10,7 @@
 #include <variant>
 #include <vector>
 
+#include "cameras/eucm.h"
 #include "cameras/fov.h"
 #include "cameras/kannala_brandt.h"
 #include "cameras/pinhole.h"
@@ -17,7 +18,7 @@
 
 namespace dlsd {
 
-using CameraModelVariant = std::variant<Pinhole, Fov, KannalaBrandt, UnifiedOmni>;
+using CameraModelVariant = std::variant<Pinhole, Fov, KannalaBrandt, UnifiedOmni, Eucm>;
 
 /// A calibrated central camera. A value: cheap to copy, comparable, immutable.
 class Camera {

@@ -155,4 +155,22 @@ Real oracleMaxRadius(const UnifiedOmni& m) {
   return xi <= 1 ? kInfinity : 1 / std::sqrt(xi * xi - 1);
 }
 
+std::optional<Oracle2> oracleProject(const Eucm& m, Real x, Real y, Real z) {
+  if (!(fieldAngle(x, y, z) < oracleMaxFieldAngle(m))) return std::nullopt;
+  const Real d = std::sqrt(m.beta * (x * x + y * y) + z * z);
+  const Real denom = m.alpha * d + (1 - static_cast<Real>(m.alpha)) * z;
+  return Oracle2{m.fx * (x / denom) + m.cx, m.fy * (y / denom) + m.cy};
+}
+
+Real oracleMaxFieldAngle(const Eucm& m) {
+  const Real alpha = m.alpha;
+  const Real cosine = alpha <= 0.5L ? -alpha / (1 - alpha) : -(1 - alpha) / alpha;
+  const Real sine = std::sqrt(1 - cosine * cosine);  // Where d = 1.
+  return std::atan2(sine / std::sqrt(static_cast<Real>(m.beta)), cosine);
+}
+Real oracleMaxRadius(const Eucm& m) {
+  const Real alpha = m.alpha;
+  return alpha <= 0.5L ? kInfinity : 1 / std::sqrt(m.beta * (2 * alpha - 1));
+}
+
 }  // namespace dlsd

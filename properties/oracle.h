@@ -30,12 +30,17 @@ using Oracle2 = std::array<long double, 2>;
                                                    long double x,
                                                    long double y,
                                                    long double z);
+[[nodiscard]] std::optional<Oracle2> oracleProject(const Eucm& m,
+                                                   long double x,
+                                                   long double y,
+                                                   long double z);
 
 /// Supremum of the field angle of rays that project, rad.
 [[nodiscard]] long double oracleMaxFieldAngle(const Pinhole& m);
 [[nodiscard]] long double oracleMaxFieldAngle(const Fov& m);
 [[nodiscard]] long double oracleMaxFieldAngle(const KannalaBrandt& m);
 [[nodiscard]] long double oracleMaxFieldAngle(const UnifiedOmni& m);
+[[nodiscard]] long double oracleMaxFieldAngle(const Eucm& m);
 
 /// Relative uncertainty of that angle when it is found in double: large where the fold is flat.
 [[nodiscard]] double oracleBoundUncertainty(const CameraModelVariant& model);
@@ -46,5 +51,6 @@ using Oracle2 = std::array<long double, 2>;
 [[nodiscard]] long double oracleMaxRadius(const Fov& m);
 [[nodiscard]] long double oracleMaxRadius(const KannalaBrandt& m);
 [[nodiscard]] long double oracleMaxRadius(const UnifiedOmni& m);
+[[nodiscard]] long double oracleMaxRadius(const Eucm& m);
 
 }  // namespace dlsd

@@ -23,11 +23,12 @@ struct KalibrModel {
   std::string_view name;  ///< kName of our model.
   size_t intrinsics;      ///< How many of the parameters stand in `intrinsics`.
 };
-constexpr std::array<KalibrModel, 4> kKalibrModels{{
+constexpr std::array<KalibrModel, 5> kKalibrModels{{
     {"pinhole", "none", Pinhole::kName, 4},
     {"pinhole", "fov", Fov::kName, 4},
     {"pinhole", "equidistant", KannalaBrandt::kName, 4},
     {"omni", "none", UnifiedOmni::kName, 5},
+    {"eucm", "none", Eucm::kName, 6},
 }};
 
 /// Keys of Kalibr that say nothing about the intrinsics.
