@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <ostream>
 #include <utility>
 
@@ -35,11 +36,26 @@ double latticePoint(double lo, double hi, uint64_t index) {
   return std::clamp(lo + (hi - lo) * t, lo, hi);
 }
 
-bool isFocal(const ParamSpec& spec) {
-  return spec.name == "fx" || spec.name == "fy";
-}
 bool isCentre(const ParamSpec& spec) {
   return spec.name == "cx" || spec.name == "cy";
+}
+
+/// n, if a parameter's unit is px^n: what a scaling of the image does to it. Read from its unit.
+int powerOfPixels(const ParamSpec& spec) {
+  if (spec.unit.starts_with("px")) return 1;
+  if (spec.unit == "1/px") return -1;
+  if (spec.unit.starts_with("1/px^")) return -(spec.unit.back() - '0');
+  return 0;
+}
+
+/// The parameter that sets the scale of the image, px per rad on the axis up to a factor: the first
+/// in px, centre apart, that is never zero.
+size_t scaleIndex(std::span<const ParamSpec> specs) {
+  const auto found = std::find_if(specs.begin(), specs.end(), [](const ParamSpec& spec) {
+    return powerOfPixels(spec) == 1 && !isCentre(spec) &&
+           spec.realistic_min * spec.realistic_max > 0;
+  });
+  return static_cast<size_t>(found - specs.begin());
 }
 
 size_t indexOf(std::span<const ParamSpec> specs, std::string_view name) {
@@ -91,23 +107,39 @@ Camera makeRealistic(std::string_view model_name, std::vector<double> params, co
     const size_t i = indexOf(specs, name);
     params[i] = std::clamp(value, specs[i].realistic_min, specs[i].realistic_max);
   };
-  // The model with unit focal length. Distortions that fold too early are weakened.
-  params[indexOf(specs, "fx")] = params[indexOf(specs, "fy")] = 1;
+  const size_t fy = indexOf(specs, "fy"), scale = scaleIndex(specs);
   params[indexOf(specs, "cx")] = params[indexOf(specs, "cy")] = 0;
-  Camera unit = makeCamera(model_name, params, 1, 1);
-  while (unit.maxFieldAngle() < 0.7) {
+  // The shape of the lens, as the table gives it for a camera of usual size.
+  const ParamSpec& size = specs[scale];
+  params[scale] =
+      std::copysign(std::sqrt(size.realistic_min * size.realistic_max), size.realistic_min);
+  if (fy < specs.size()) params[fy] = params[scale];
+  // Distortions that fold too early are weakened.
+  Camera shape = makeCamera(model_name, params, 1, 1);
+  while (shape.maxFieldAngle() < 0.7) {
     for (size_t i = 0; i < params.size(); ++i) {
-      if (!isFocal(specs[i]) && !isCentre(specs[i])) params[i] /= 2;
+      if (specs[i].realistic_min * specs[i].realistic_max <= 0) params[i] /= 2;
     }
-    unit = makeCamera(model_name, params, 1, 1);
+    shape = makeCamera(model_name, params, 1, 1);
   }
-  const double most = std::min(0.95 * unit.maxFieldAngle(), 2.0);
+  // Nobody builds a lens that stretches its rim 200 times as much as its centre (a pinhole's is 162
+  // at 0.95 * 90 degrees).
+  const auto stretch = [&](double angle) {
+    const auto J = shape.jacobian({std::sin(angle), 0, std::cos(angle)});
+    return J ? J->norm() : std::numeric_limits<double>::infinity();
+  };
+  double most = std::min(0.95 * shape.maxFieldAngle(), 2.0);
+  while (stretch(most) > 200 * stretch(0)) most = 0.3 + 0.95 * (most - 0.3);
   const double angle = 0.3 + (most - 0.3) * lens.corner_angle;
-  const double radius = unit.project({std::sin(angle), 0, std::cos(angle)}).value().x();
+  const double radius = shape.project({std::sin(angle), 0, std::cos(angle)}).value().x();
   const double half_diagonal = std::hypot(lens.width, lens.height) / 2;
-  const double fx = half_diagonal / (radius * lens.overshoot);
-  set("fx", fx);
-  set("fy", params[indexOf(specs, "fx")] * lens.aspect);
+  const double wanted = params[scale] * half_diagonal / (radius * lens.overshoot);
+  const double factor = std::clamp(wanted, size.realistic_min, size.realistic_max) / params[scale];
+  for (size_t i = 0; i < params.size(); ++i) {
+    params[i] = std::clamp(
+        params[i] * std::pow(factor, powerOfPixels(specs[i])), specs[i].min, specs[i].max);
+  }
+  if (fy < specs.size()) set("fy", params[fy] * lens.aspect);
   set("cx", lens.width * (0.5 + lens.shift_x) - 0.5);
   set("cy", lens.height * (0.5 + lens.shift_y) - 0.5);
   return makeCamera(
@@ -125,15 +157,9 @@ rc::Gen<std::vector<double>> genParams(std::span<const ParamSpec> specs, Range r
   });
 }
 
-template <size_t I = 0>
-std::vector<std::string_view> modelNames() {
-  if constexpr (I < std::variant_size_v<CameraModelVariant>) {
-    std::vector<std::string_view> names = modelNames<I + 1>();
-    names.insert(names.begin(), std::variant_alternative_t<I, CameraModelVariant>::kName);
-    return names;
-  } else {
-    return {};
-  }
+template <class... Models>
+std::vector<std::string_view> namesOf(const std::variant<Models...>*) {
+  return {Models::kName...};
 }
 
 }  // namespace
@@ -206,8 +232,12 @@ rc::Gen<Camera> genCamera(std::string_view model_name, Range range) {
                       });
 }
 
+std::vector<std::string_view> cameraModelNames() {
+  return namesOf(static_cast<const CameraModelVariant*>(nullptr));
+}
+
 rc::Gen<Camera> genAnyCamera(Range range) {
-  const std::vector<std::string_view> names = modelNames();
+  const std::vector<std::string_view> names = cameraModelNames();
   return rc::gen::mapcat(genInt(0, static_cast<int>(names.size()) - 1), [names, range](int i) {
     return genCamera(names[static_cast<size_t>(i)], range);
   });
@@ -303,10 +333,20 @@ Eigen::Vector2d principalPoint(const Camera& camera) {
   return {params[indexOf(specs, "cx")], params[indexOf(specs, "cy")]};
 }
 
-Eigen::Vector2d focalLengths(const Camera& camera) {
+Eigen::Matrix2d pixelFromPlane(const Camera& camera) {
   const std::vector<double> params = camera.params();
   const std::span<const ParamSpec> specs = camera.paramSpecs();
-  return {params[indexOf(specs, "fx")], params[indexOf(specs, "fy")]};
+  const auto get = [&](std::initializer_list<std::string_view> names, double otherwise) {
+    for (const std::string_view name : names) {
+      const size_t i = indexOf(specs, name);
+      if (i < specs.size()) return params[i];
+    }
+    return otherwise;
+  };
+  Eigen::Matrix2d A;
+  A << get({"fx"}, 1), get({"skew", "e"}, 0),  //
+      get({"d"}, 0), get({"fy", "aspect", "c"}, 1);
+  return A;
 }
 
 std::ostream& operator<<(std::ostream& out, const Camera& camera) {

@@ -13,6 +13,7 @@
 #include <string_view>
 #include <type_traits>
 #include <variant>
+#include <vector>
 
 #include "cameras/camera.h"
 
@@ -39,13 +40,18 @@ enum class Range {
 /// A camera of the model of this name. Realistic: the image's half diagonal looks 0.3 rad ... 2 rad
 /// away from the axis (less where the domain ends before), the corners of some images lie outside
 /// the domain, pixels are nearly square, the principal point is near the centre; 1 in 4 has a limit
-/// of the field angle. Joint conditions come out as the model's domain, which is at least 0.7 rad.
+/// of the field angle. Parameters that depend on the size of the image are those of the table for
+/// a camera of usual size (the geometric mean of the range of fx), scaled to the drawn one. Joint
+/// conditions come out as the model's domain, which is at least 0.7 rad.
 [[nodiscard]] rc::Gen<Camera> genCamera(std::string_view model_name, Range range);
 
 template <class Model>
 [[nodiscard]] rc::Gen<Camera> genCamera(Range range) {
   return genCamera(Model::kName, range);
 }
+
+/// kName of every model.
+[[nodiscard]] std::vector<std::string_view> cameraModelNames();
 
 /// Any model.
 [[nodiscard]] rc::Gen<Camera> genAnyCamera(Range range);
@@ -83,8 +89,9 @@ template <class Model>
 /// Principal point, by the names cx and cy in kParams.
 [[nodiscard]] Eigen::Vector2d principalPoint(const Camera& camera);
 
-/// (fx, fy), by their names in kParams.
-[[nodiscard]] Eigen::Vector2d focalLengths(const Camera& camera);
+/// The linear map from a model's plane to pixels relative to the principal point, by the names in
+/// kParams: of focal lengths and skew, or of aspect ratio and shear.
+[[nodiscard]] Eigen::Matrix2d pixelFromPlane(const Camera& camera);
 
 /// One line: model, parameters with 17 digits, size, limit.
 std::ostream& operator<<(std::ostream& out, const Camera& camera);

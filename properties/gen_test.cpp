@@ -101,7 +101,7 @@ TEST(GenInt, ReachesAllValuesAndShrinksToTheLeast) {
 
 TEST(GenParam, StaysInTheTable) {
   for (const Range range : {Range::kRealistic, Range::kAdmissible}) {
-    for (const std::string_view model : {"pinhole", "fov", "kannala_brandt", "omni"}) {
+    for (const std::string_view model : cameraModelNames()) {
       for (const ParamSpec& spec : paramSpecsOf(model)) {
         const bool realistic = range == Range::kRealistic;
         for (const double x : draws(genParam(spec, range), 500)) {
@@ -114,7 +114,7 @@ TEST(GenParam, StaysInTheTable) {
 }
 
 TEST(GenCamera, RealisticCamerasSeeSomethingInMostOfTheirPixels) {
-  for (const std::string_view model : {"pinhole", "fov", "kannala_brandt", "omni"}) {
+  for (const std::string_view model : cameraModelNames()) {
     int seen = 0, limited = 0, with_blind_corner = 0;
     const auto cameras = draws(genCamera(model, Range::kRealistic), 300);
     for (const Camera& camera : cameras) {

@@ -1,6 +1,8 @@
 #include "properties/oracle.h"
 
+#include <algorithm>
 #include <cmath>
+#include <complex>
 #include <limits>
 
 namespace dlsd {
@@ -47,6 +49,131 @@ Real leastSlope(const KannalaBrandt& m, Real lo, Real hi) {
     }
   }
   return lo;
+}
+
+/// The radial-tangential distortion of a point of the plane.
+template <class S>
+std::array<S, 2> distorted(const Radtan& d, S x, S y) {
+  const S r2 = x * x + y * y;
+  const S radial = 1 + d.k1 * r2 + d.k2 * (r2 * r2) + d.k3 * (r2 * r2 * r2);
+  return {x * radial + 2 * d.p1 * (x * y) + d.p2 * (r2 + 2 * (x * x)),
+          y * radial + d.p1 * (r2 + 2 * (y * y)) + 2 * d.p2 * (x * y)};
+}
+
+/// Least determinant of the Jacobian of the distortion over the azimuths at radius r, times a
+/// positive number. From the entries of the Jacobian: the determinant is quadratic in the cosine of
+/// the angle to (p2, p1), so three azimuths give it all.
+Real leastDeterminant(const Radtan& d, Real r) {
+  const Real length = std::hypot(static_cast<Real>(d.p1), static_cast<Real>(d.p2));
+  const Real ex = length > 0 ? d.p2 / length : 1, ey = length > 0 ? d.p1 / length : 0;
+  const auto at = [&](Real cosine, Real sine) {
+    const Real x = r * (ex * cosine - ey * sine), y = r * (ey * cosine + ex * sine);
+    const Real r2 = x * x + y * y;
+    const Real radial = 1 + d.k1 * r2 + d.k2 * (r2 * r2) + d.k3 * (r2 * r2 * r2);
+    const Real rise = d.k1 + 2 * d.k2 * r2 + 3 * d.k3 * (r2 * r2);  // By r2.
+    const Real xx = radial + 2 * x * x * rise + 2 * d.p1 * y + 6 * d.p2 * x;
+    const Real yy = radial + 2 * y * y * rise + 6 * d.p1 * y + 2 * d.p2 * x;
+    const Real xy = 2 * x * y * rise + 2 * d.p1 * x + 2 * d.p2 * y;
+    return xx * yy - xy * xy;
+  };
+  const Real ahead = at(1, 0), beside = at(0, 1), behind = at(-1, 0);
+  const Real quadratic = (ahead + behind) / 2 - beside, linear = (ahead - behind) / 2;
+  Real least = std::min(ahead, behind);
+  if (quadratic > 0 && std::abs(linear) < 2 * quadratic) {
+    least = std::min(least, beside - linear * linear / (4 * quadratic));
+  }
+  return least;
+}
+
+/// The first r in [from, to] at which a function that is positive at first falls below 0; infinite
+/// if it does not. On a grid in the logarithm, and at the minima between its points.
+template <class Function>
+Real firstFall(const Function& function, Real from, Real to) {
+  const int count = static_cast<int>(40 * std::log10(to / from));
+  const auto grid = [&](int i) { return from * std::pow(to / from, static_cast<Real>(i) / count); };
+  Real above = 0;  // Last place known with a value >= 0.
+  for (int i = 1; i <= count; ++i) {
+    Real r = grid(i);
+    if (function(r) >= 0) {
+      Real lo = grid(i - 1), hi = r;
+      const Real step = (hi - lo) * 1e-6L;
+      if (function(lo + step) < function(lo) && function(hi - step) < function(hi)) {
+        for (int k = 0; k < 100; ++k) {
+          const Real a = lo + (hi - lo) / 3, b = hi - (hi - lo) / 3;
+          if (function(a) < function(b)) {
+            hi = b;
+          } else {
+            lo = a;
+          }
+        }
+      }
+      if (function(lo) >= 0) {
+        above = r;
+        continue;
+      }
+      r = lo;
+    }
+    Real below = r;
+    for (int k = 0; k < 80; ++k) {
+      const Real middle = (above + below) / 2;
+      (function(middle) >= 0 ? above : below) = middle;
+    }
+    return below;
+  }
+  return kInfinity;
+}
+
+/// What a function of a camera's distortion last gave: tests ask for many rays of one camera in a
+/// row, so one entry is enough.
+template <class Key, class Function>
+Real remembered(const Key& key, const Function& function) {
+  thread_local Key known{};
+  thread_local Real answer = function(known);
+  if (!(key == known)) {
+    known = key;
+    answer = function(key);
+  }
+  return answer;
+}
+
+Real maxRadius(const Radtan& distortion) {
+  return remembered(distortion, [](const Radtan& d) {
+    return firstFall([&](Real r) { return leastDeterminant(d, r); }, 1e-4L, 1e15L);
+  });
+}
+
+/// Relative uncertainty of a zero of a function that has this slope there, when its terms (of this
+/// sum of absolute values) are added in double.
+Real uncertainty(Real at, Real sum, Real slope) {
+  return static_cast<Real>(std::numeric_limits<double>::epsilon()) * sum / std::abs(slope * at);
+}
+
+/// Of maxRadius, relative.
+Real maxRadiusUncertainty(const Radtan& d) {
+  const Real r = maxRadius(d);
+  if (r == kInfinity) return 0;
+  const Real r2 = r * r, p = std::hypot(static_cast<Real>(d.p1), static_cast<Real>(d.p2));
+  const Real sum = 1 + std::abs(3 * d.k1 * r2) + std::abs(5 * d.k2 * r2 * r2) +
+                   std::abs(7 * d.k3 * r2 * r2 * r2) + 8 * p * r;
+  const Real h = r * 1e-6L;
+  const Real slope = (leastDeterminant(d, r + h) - leastDeterminant(d, r - h)) / (2 * h);
+  return uncertainty(r, sum * sum, slope);
+}
+
+/// Whether the distortion maps a point of the disc of this radius to (x, y). As complex numbers,
+/// with f the radial part on the rim, P e^(i alpha) = p2 + i p1 and n = (x + i y - 2 p radius^2)
+/// e^(-i alpha), the rim's image is f z + b z^2 = n, |z| = 1, b = P radius^2. It winds around n
+/// once or not at all; by the argument principle as often as that equation has roots in |z| < 1,
+/// and of its two roots the smaller one is 2 n / (f + sqrt(f^2 + 4 b n)).
+bool hasSource(const Radtan& d, Real radius, Real x, Real y) {
+  if (radius == kInfinity) return true;
+  using Complex = std::complex<Real>;
+  const Complex p(d.p2, d.p1);
+  const Real length = std::abs(p), r2 = radius * radius;
+  const Complex direction = length > 0 ? p / length : Complex(1);
+  const Real f = radius * (1 + d.k1 * r2 + d.k2 * (r2 * r2) + d.k3 * (r2 * r2 * r2));
+  const Complex n = (Complex(x, y) - p * (2 * r2)) * std::conj(direction);
+  return std::abs(2.0L * n / (f + std::sqrt(f * f + 4 * length * r2 * n))) < 1;
 }
 
 }  // namespace
@@ -124,6 +251,9 @@ Real oracleMaxFieldAngle(const KannalaBrandt& m) {
 }
 double oracleBoundUncertainty(const CameraModelVariant& model) {
   constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
+  if (const auto* radtan = std::get_if<PinholeRadtan>(&model)) {
+    return 4 * kEpsilon + static_cast<double>(maxRadiusUncertainty(radtan->radtan));
+  }
   const auto* m = std::get_if<KannalaBrandt>(&model);
   if (m == nullptr || oracleMaxFieldAngle(*m) == kPi) return 4 * kEpsilon;
   const Real theta = oracleMaxFieldAngle(*m), t = theta * theta;
@@ -136,6 +266,13 @@ double oracleBoundUncertainty(const CameraModelVariant& model) {
   }
   return 4 * kEpsilon * (1 + static_cast<double>(sum / std::abs(slope)));
 }
+
+double oracleBendAtAxis(const CameraModelVariant& model) {
+  const auto tangential = [](const Radtan& d) { return 6 * std::hypot(d.p1, d.p2); };
+  if (const auto* m = std::get_if<PinholeRadtan>(&model)) return tangential(m->radtan);
+  return 0;
+}
+
 Real oracleMaxRadius(const KannalaBrandt& m) {
   return distortion(m, oracleMaxFieldAngle(m));
 }
@@ -153,6 +290,19 @@ Real oracleMaxFieldAngle(const UnifiedOmni& m) {
 Real oracleMaxRadius(const UnifiedOmni& m) {
   const Real xi = m.xi;
   return xi <= 1 ? kInfinity : 1 / std::sqrt(xi * xi - 1);
+}
+
+std::optional<Oracle2> oracleProject(const PinholeRadtan& m, Real x, Real y, Real z) {
+  if (!(fieldAngle(x, y, z) < oracleMaxFieldAngle(m))) return std::nullopt;
+  const auto [mx, my] = distorted(m.radtan, x / z, y / z);
+  return Oracle2{m.fx * mx + m.cx, m.fy * my + m.cy};
+}
+
+Real oracleMaxFieldAngle(const PinholeRadtan& m) {
+  return std::atan(maxRadius(m.radtan));
+}
+bool oracleHasRay(const PinholeRadtan& m, Real u, Real v) {
+  return hasSource(m.radtan, maxRadius(m.radtan), (u - m.cx) / m.fx, (v - m.cy) / m.fy);
 }
 
 std::optional<Oracle2> oracleProject(const Eucm& m, Real x, Real y, Real z) {
