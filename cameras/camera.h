@@ -25,8 +25,8 @@ using CameraModelVariant =
 
 /// A calibrated central camera. A value: cheap to copy, comparable, immutable.
 class Camera {
-public:
-  static constexpr int kMaxImageSize = 65535; ///< px, of width and height.
+ public:
+  static constexpr int kMaxImageSize = 65535;  ///< px, of width and height.
 
   /// Takes over the model's parameters; what a model derives from them is
   /// derived again.
@@ -37,16 +37,13 @@ public:
   /// Throws std::invalid_argument naming the parameter, its value and the
   /// allowed range if a parameter is outside the model's admissible range or
   /// not finite, or a size outside [1, 65535].
-  Camera(const CameraModelVariant &model, int width, int height,
-         double max_field_angle_rad = M_PI);
+  Camera(const CameraModelVariant& model, int width, int height, double max_field_angle_rad = M_PI);
 
-  [[nodiscard]] const CameraModelVariant &model() const { return model_; }
+  [[nodiscard]] const CameraModelVariant& model() const { return model_; }
   [[nodiscard]] int width() const { return width_; }
   [[nodiscard]] int height() const { return height_; }
   /// As given to the constructor.
-  [[nodiscard]] double maxFieldAngleLimit() const {
-    return max_field_angle_rad_;
-  }
+  [[nodiscard]] double maxFieldAngleLimit() const { return max_field_angle_rad_; }
   /// Supremum of the angle to +z (rad) of rays that project: the smaller of
   /// model's and limit.
   [[nodiscard]] double maxFieldAngle() const;
@@ -57,27 +54,24 @@ public:
   /// Pixel of a ray or point in the camera frame (any positive scale). No value
   /// outside the model's domain. The pixel may lie outside the image: ask
   /// inImage.
-  [[nodiscard]] std::optional<Eigen::Vector2d>
-  project(const Eigen::Vector3d &ray_in_cam) const;
+  [[nodiscard]] std::optional<Eigen::Vector2d> project(const Eigen::Vector3d& ray_in_cam) const;
 
   /// Unit ray in the camera frame of a pixel, inside the image or not. No value
   /// outside the domain.
-  [[nodiscard]] std::optional<Eigen::Vector3d>
-  unproject(const Eigen::Vector2d &pixel) const;
+  [[nodiscard]] std::optional<Eigen::Vector3d> unproject(const Eigen::Vector2d& pixel) const;
 
   /// d(pixel) / d(ray) at a ray that projects. No value outside the domain.
-  [[nodiscard]] std::optional<ProjectionJacobian>
-  jacobian(const Eigen::Vector3d &ray_in_cam) const;
+  [[nodiscard]] std::optional<ProjectionJacobian> jacobian(const Eigen::Vector3d& ray_in_cam) const;
 
   /// The image covers [-0.5, width - 0.5] x [-0.5, height - 0.5].
-  [[nodiscard]] bool inImage(const Eigen::Vector2d &pixel) const {
-    return pixel.x() >= -0.5 && pixel.x() <= width_ - 0.5 &&
-           pixel.y() >= -0.5 && pixel.y() <= height_ - 0.5;
+  [[nodiscard]] bool inImage(const Eigen::Vector2d& pixel) const {
+    return pixel.x() >= -0.5 && pixel.x() <= width_ - 0.5 && pixel.y() >= -0.5 &&
+           pixel.y() <= height_ - 0.5;
   }
 
-  bool operator==(const Camera &) const = default;
+  bool operator==(const Camera&) const = default;
 
-private:
+ private:
   CameraModelVariant model_;
   int width_, height_;
   double max_field_angle_rad_;
@@ -85,14 +79,15 @@ private:
 
 /// Parameter table of a model by its kName. Throws std::invalid_argument for an
 /// unknown name.
-[[nodiscard]] std::span<const ParamSpec>
-paramSpecsOf(std::string_view model_name);
+[[nodiscard]] std::span<const ParamSpec> paramSpecsOf(std::string_view model_name);
 
 /// Builds a camera from a model's name and its parameters in the order of its
 /// kParams. Throws std::invalid_argument for an unknown name, a wrong number of
 /// parameters or a bad value.
 [[nodiscard]] Camera makeCamera(std::string_view model_name,
-                                std::span<const double> params, int width,
-                                int height, double max_field_angle_rad = M_PI);
+                                std::span<const double> params,
+                                int width,
+                                int height,
+                                double max_field_angle_rad = M_PI);
 
-} // namespace dlsd
+}  // namespace dlsd
