@@ -440,12 +440,8 @@ TEST_F(Cli, UnwritableOutputsAreThree) {
   expectRefused("generate --camera wide.yaml --count 1 --out file", 3, "file");
   expectRefused("generate --camera wide.yaml --count 1 --out file/data", 3, "file");
   expectRefused("generate --camera wide.yaml --count 1 --out /proc/dlsd", 3, "/proc/dlsd");
-  expectRefused(detect + "file/d.jsonl", 3, "file/d.jsonl");
-  expectRefused(detect + "nowhere/d.jsonl", 3, "nowhere");
-  expectRefused(detect + "data", 3, "data");
   expectRefused(detect + "/dev/full", 3, "/dev/full");
   expectRefused(detect + "d.jsonl --overlay file", 3, "file");
-  expectRefused("evaluate --data data --json nowhere/e.json", 3, "nowhere");
   expectRefused("evaluate --data data --json /dev/full", 3, "/dev/full");
   expectRefused("report --data data --out file", 3, "file");
   expectRefused("report --data data --detections det.jsonl --out /proc/dlsd", 3, "/proc/dlsd");
@@ -460,6 +456,25 @@ TEST_F(Cli, UnwritableOutputsAreThree) {
     EXPECT_THAT(contentOf(folder / ".stderr"),
                 StartsWith("dlsd: standard output: cannot be written"));
   }
+}
+
+TEST_F(Cli, OutputsWhereNoFileCanBeAreTwo) {
+  generate();
+  write("file", "stands here");
+  const std::string detect = "detect --camera wide.yaml data/images/000000.png --out ";
+  expectRefused(detect + "nowhere/d.jsonl", 2, "the folder nowhere does not exist");
+  expectRefused(detect + "file/d.jsonl", 2, "file/d.jsonl");
+  expectRefused(detect + "data", 2, "data: cannot be written: a folder stands there");
+  expectRefused("evaluate --data data --json nowhere/e.json", 2, "the folder nowhere");
+}
+
+TEST_F(Cli, UnknownCommandsAreTwoWhateverFollows) {
+  expectRefused("detct --help", 2, "did you mean detect?");
+  expectRefused("detcet", 2, "did you mean detect?");
+  expectRefused("camera shw wide.yaml --help", 2, "dlsd camera has no command \"shw\"");
+  expectRefused("camera shw", 2, "did you mean show?");
+  expectRefused("xylophone --help", 2, "generate, detect, evaluate");
+  EXPECT_EQ(dlsd("--help detct").code, 0);
 }
 
 TEST_F(Cli, BadDataAndDetectionsAreTwo) {
@@ -519,7 +534,7 @@ TEST_F(Cli, MinRecallIsAGate) {
   write("nothing.jsonl", nothing);
   Result result = dlsd("evaluate --data data --detections nothing.jsonl --min-recall 0.5@4");
   EXPECT_EQ(result.code, 1);
-  EXPECT_EQ(result.err, "");
+  EXPECT_EQ(result.err, "dlsd: --min-recall 0.5@4 is not reached by nothing.jsonl\n");
   EXPECT_THAT(result.out,
               HasSubstr("\nfailed: nothing.jsonl: headline labels found at rho = 4 px are 0/"));
 

@@ -138,11 +138,11 @@ void checkPlaceForFile(const std::string& path) {
     folder = ".";
   }
   if (fs::is_directory(path, error)) {
-    throw SystemError(path + ": cannot be written: a folder stands there");
+    throw InputError(path + ": cannot be written: a folder stands there");
   }
   if (!fs::is_directory(folder, error)) {
-    throw SystemError(path + ": cannot be written: the folder " + folder.string() +
-                      " does not exist");
+    throw InputError(path + ": cannot be written: the folder " + folder.string() +
+                     " does not exist");
   }
 }
 

@@ -72,7 +72,7 @@ template <std::integral T>
 /// another output.
 void checkOutputs(const std::vector<std::string>& inputs, const std::vector<std::string>& outputs);
 
-/// Throws SystemError if a file can't be put at `path` since its folder is missing or a folder
+/// Throws InputError if a file can't be put at `path` since its folder is missing or a folder
 /// stands there: asked before long work.
 void checkPlaceForFile(const std::string& path);
 

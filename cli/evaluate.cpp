@@ -86,7 +86,7 @@ int run(Arguments& arguments) {
     }
   }
 
-  bool passed = true;
+  std::vector<std::string> failed;
   std::string text, verdicts;
   nlohmann::ordered_json results = nlohmann::ordered_json::array();
   for (const auto& [name, source] : sources) {
@@ -107,7 +107,9 @@ int run(Arguments& arguments) {
           summary.all.at_rho[min_recall->rho_index].found[size_t(Stratum::kHeadline)];
       const bool enough =
           found.total > 0 && double(found.counted) >= min_recall->share * double(found.total);
-      passed = passed && enough;
+      if (!enough) {
+        failed.push_back(name);
+      }
       verdicts +=
           fmt::format("{}: {}: headline labels found at rho = {:g} px are {}, asked for {:g}\n",
                       enough ? "passed" : "failed",
@@ -125,7 +127,12 @@ int run(Arguments& arguments) {
     writeFileAtomically(arguments.json, json.dump(1) + "\n");
   }
   print(text);
-  return passed ? kDone : kCheckFailed;
+  if (failed.empty()) {
+    return kDone;
+  }
+  complain(fmt::format(
+      "--min-recall {} is not reached by {}", arguments.min_recall, fmt::join(failed, ", ")));
+  return kCheckFailed;
 }
 
 }  // namespace

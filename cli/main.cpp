@@ -6,10 +6,12 @@
 #include <CLI/App.hpp>
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
+#include <algorithm>
 #include <exception>
 #include <filesystem>
 #include <new>
 #include <stdexcept>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -37,6 +39,64 @@ constexpr Entry kCommands[] = {
     {"replay", "Make a saved property case again and check it.", addReplay},
 };
 
+/// Changes of one letter (also two neighbours swapped) that turn one word into the other.
+size_t editDistance(std::string_view a, std::string_view b) {
+  std::vector<std::vector<size_t>> d(a.size() + 1, std::vector<size_t>(b.size() + 1));
+  for (size_t i = 0; i <= a.size(); ++i) {
+    for (size_t j = 0; j <= b.size(); ++j) {
+      if (i == 0 || j == 0) {
+        d[i][j] = i + j;
+        continue;
+      }
+      const size_t change = d[i - 1][j - 1] + (a[i - 1] == b[j - 1] ? 0 : 1);
+      d[i][j] = std::min({d[i - 1][j] + 1, d[i][j - 1] + 1, change});
+      if (i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1]) {
+        d[i][j] = std::min(d[i][j], d[i - 2][j - 2] + 1);
+      }
+    }
+  }
+  return d[a.size()][b.size()];
+}
+
+/// Throws InputError if a word where a command belongs is none. CLI11 alone would show the general
+/// help for `dlsd detct --help`.
+void checkCommands(const CLI::App& app, int argc, char** argv) {
+  const CLI::App* at = &app;
+  std::string path = "dlsd";
+  for (int i = 1; i < argc && argv[i][0] != '-'; ++i) {
+    const std::vector<const CLI::App*> known = at->get_subcommands(nullptr);
+    if (known.empty()) {
+      return;
+    }
+    const std::string_view word = argv[i];
+    std::vector<std::string> names;
+    at = nullptr;
+    for (const CLI::App* command : known) {
+      names.push_back(command->get_name());
+      if (names.back() == word) {
+        at = command;
+      }
+    }
+    if (at == nullptr) {
+      const auto closest =
+          std::min_element(names.begin(), names.end(), [&](const auto& a, const auto& b) {
+            return editDistance(a, word) < editDistance(b, word);
+          });
+      throw dlsd::InputError(
+          editDistance(*closest, word) <= 2
+              ? fmt::format("{0} has no command \"{1}\", did you mean {2}? ({0} {2} --help)",
+                            path,
+                            word,
+                            *closest)
+              : fmt::format("{0} has no command \"{1}\", only {2} ({0} --help)",
+                            path,
+                            word,
+                            fmt::join(names, ", ")));
+    }
+    path += " " + at->get_name();
+  }
+}
+
 int run(int argc, char** argv) {
   CLI::App app{"Distorted straight line segments: exact synthetic data, detection, evaluation."};
   app.name("dlsd");
@@ -47,6 +107,7 @@ int run(int argc, char** argv) {
     CLI::App* command = app.add_subcommand(entry.name, entry.help);
     commands.emplace_back(command, entry.add(*command));
   }
+  checkCommands(app, argc, argv);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
