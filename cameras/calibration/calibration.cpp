@@ -1,334 +1,336 @@
 #include "cameras/calibration/calibration.h"
 
-#include <yaml-cpp/yaml.h>
-
 #include <algorithm>
+#include <array>
 #include <charconv>
-#include <cmath>
 #include <filesystem>
-#include <numeric>
 #include <optional>
 #include <set>
 #include <stdexcept>
 
 #include "cameras/calibration/files.h"
+#include "cameras/calibration/formats.h"
 
 namespace dlsd {
+namespace calib {
 namespace {
 
-/// Which model a pair of Kalibr names means. The model's parameters, in the order of its kParams,
-/// are the file's intrinsics followed by its distortion coefficients.
-struct KalibrModel {
-  std::string_view camera_model, distortion_model;
-  std::string_view name;  ///< kName of our model.
-  size_t intrinsics;      ///< How many of the parameters stand in `intrinsics`.
-};
-constexpr std::array<KalibrModel, 5> kKalibrModels{{
-    {"pinhole", "none", Pinhole::kName, 4},
-    {"pinhole", "fov", Fov::kName, 4},
-    {"pinhole", "equidistant", KannalaBrandt::kName, 4},
-    {"omni", "none", UnifiedOmni::kName, 5},
-    {"eucm", "none", Eucm::kName, 6},
+constexpr std::array<Format, 14> kFormats{{
+    {"kalibr",
+     "Kalibr camchain: cam0, cam1, ... (the native format)",
+     true,
+     isKalibr,
+     readKalibr,
+     writeKalibr},
+    {"opencv",
+     "OpenCV FileStorage: camera_matrix or K, the model as fisheye_model, xi or the coefficients "
+     "say",
+     true,
+     isOpencv,
+     readOpencv,
+     writeOpencv},
+    {"opencv-fisheye",
+     "OpenCV FileStorage of cv::fisheye",
+     true,
+     nullptr,
+     readOpencvFisheye,
+     writeOpencvFisheye},
+    {"opencv-omnidir",
+     "OpenCV FileStorage of cv::omnidir",
+     true,
+     nullptr,
+     readOpencvOmnidir,
+     writeOpencvOmnidir},
+    {"opencv-pinhole",
+     "OpenCV FileStorage of the pinhole model",
+     true,
+     nullptr,
+     readOpencvPinhole,
+     writeOpencvPinhole},
+    {"colmap", "COLMAP cameras.txt: ID MODEL ...", false, isColmap, readColmap, writeColmap},
+    {"basalt", "Basalt JSON: value0", true, isBasalt, readBasalt, writeBasalt},
+    {"ros",
+     "ROS camera_info YAML: camera_matrix and distortion_model",
+     true,
+     isRos,
+     readRos,
+     writeRos},
+    {"camodocal", "camodocal, VINS: model_type", true, isCamodocal, readCamodocal, nullptr},
+    {"orbslam3", "ORB-SLAM3 settings: Camera.type", true, isOrbSlam3, readOrbSlam3, nullptr},
+    {"tum", "TUM mono, DSO camera.txt: four lines", false, isTum, readTum, nullptr},
+    {"ocamcalib",
+     "OCamCalib calib_results.txt: five lines",
+     false,
+     isOcamcalib,
+     readOcamcalib,
+     nullptr},
+    {"woodscape", "WoodScape JSON: intrinsic", true, isWoodscape, readWoodscape, nullptr},
+    {"panorama",
+     "model: equirectangular, and a resolution: the whole sphere",
+     true,
+     isPanorama,
+     readPanorama,
+     nullptr},
 }};
 
-/// Keys of Kalibr that say nothing about the intrinsics.
-constexpr std::array<std::string_view, 5> kIgnoredKeys{
-    "rostopic", "T_cn_cnm1", "T_cam_imu", "cam_overlaps", "timeshift_cam_imu"};
-
-constexpr std::string_view kCameraModel = "camera_model";
-constexpr std::string_view kIntrinsics = "intrinsics";
-constexpr std::string_view kDistortionModel = "distortion_model";
-constexpr std::string_view kDistortionCoeffs = "distortion_coeffs";
-constexpr std::string_view kResolution = "resolution";
-constexpr std::string_view kMaxFieldAngle = "max_field_angle";
-
-std::string inQuotes(std::string_view text) {
-  constexpr size_t kMaxShown = 60;
-  std::string out = "\"";
-  for (const char c : text.substr(0, kMaxShown)) out += (c >= ' ' && c < 0x7f) ? c : '?';
-  if (text.size() > kMaxShown) out += "...";
-  return out + "\"";
-}
-
-/// Shortest text that reads back as the same number.
-std::string shortest(double value) {
-  std::array<char, 32> buffer{};
-  const auto end = std::to_chars(buffer.data(), buffer.data() + buffer.size(), value).ptr;
-  return {buffer.data(), end};
-}
-
-/// The same for YAML: Kalibr's reader takes a number without a decimal point for an integer or,
-/// with an exponent, for a string.
-std::string yamlNumber(double value) {
-  std::string text = shortest(value);
-  if (text.find('.') == std::string::npos) {
-    text.insert(std::min(text.find('e'), text.size()), ".0");
+constexpr std::array<CalibrationFormat, kFormats.size()> kPublicFormats = [] {
+  std::array<CalibrationFormat, kFormats.size()> all{};
+  for (size_t i = 0; i < all.size(); ++i) {
+    const Format& f = kFormats.at(i);
+    all.at(i) = {f.name, f.about, f.recognises != nullptr, f.write != nullptr};
   }
-  return text;
+  return all;
+}();
+
+template <class Predicate>
+std::string formatNames(Predicate predicate) {
+  std::vector<std::string_view> names;
+  for (const Format& f : kFormats) {
+    if (predicate(f)) names.push_back(f.name);
+  }
+  return listed(names);
 }
 
-std::string range(double lo, double hi) {
-  return "[" + shortest(lo) + ", " + shortest(hi) + "]";
-}
-
-std::string camerasText(const std::vector<NamedCamera>& cameras) {
-  std::string text;
-  for (const NamedCamera& c : cameras) text += (text.empty() ? "" : ", ") + c.name;
-  return text;
-}
-
-bool isCameraName(std::string_view name) {
-  if (name.size() < 4 || name.size() > 12 || !name.starts_with("cam")) return false;
-  name.remove_prefix(3);
-  return std::all_of(name.begin(), name.end(), [](char c) { return c >= '0' && c <= '9'; }) &&
-         (name.size() == 1 || name[0] != '0');
-}
-
-/// One entry of a camchain, with what is needed to name a value in a message.
-class CameraEntry {
- public:
-  CameraEntry(std::string file, std::string name, const YAML::Node& node)
-      : file_(std::move(file)), name_(std::move(name)) {
-    if (!node.IsMap()) {
-      throw InputError(file_ + ": " + name_ + " must be a map with " + std::string(kCameraModel) +
-                       ", " + std::string(kIntrinsics) + ", " + std::string(kDistortionModel) +
-                       ", " + std::string(kDistortionCoeffs) + " and " + std::string(kResolution));
-    }
-    std::set<std::string, std::less<>> seen;
-    for (const auto& item : node) {
-      if (!item.first.IsScalar()) {
-        throw InputError(file_ + ": " + name_ + " has a key that is not a plain word");
+/// Position of the first byte that is not part of UTF-8 text, or npos. Control characters other
+/// than tab and line ends are no text.
+size_t findNoText(std::string_view text) {
+  for (size_t i = 0; i < text.size();) {
+    const auto c = static_cast<unsigned char>(text[i]);
+    if ((c < 0x20 && c != '\t' && c != '\r' && c != '\n') || c == 0x7f) return i;
+    size_t length = 1;
+    uint32_t code = c;
+    if (c >= 0x80) {
+      length = c >= 0xf0 ? 4 : (c >= 0xe0 ? 3 : 2);
+      if (c < 0xc2 || c > 0xf4 || i + length > text.size()) return i;
+      code = c & (0x7fU >> length);
+      for (size_t k = 1; k < length; ++k) {
+        const auto next = static_cast<unsigned char>(text[i + k]);
+        if ((next & 0xc0U) != 0x80) return i;
+        code = (code << 6U) | (next & 0x3fU);
       }
-      const std::string& key = item.first.Scalar();
-      if (!seen.insert(key).second) fail(key, "is given twice, allowed is once");
-      if (key == kCameraModel) {
-        camera_model_ = item.second;
-      } else if (key == kIntrinsics) {
-        intrinsics_ = item.second;
-      } else if (key == kDistortionModel) {
-        distortion_model_ = item.second;
-      } else if (key == kDistortionCoeffs) {
-        distortion_coeffs_ = item.second;
-      } else if (key == kResolution) {
-        resolution_ = item.second;
-      } else if (key == kMaxFieldAngle) {
-        max_field_angle_ = item.second;
-      } else if (std::find(kIgnoredKeys.begin(), kIgnoredKeys.end(), key) == kIgnoredKeys.end()) {
-        throw InputError(file_ + ": " + name_ + " has the unknown key " + inQuotes(key) +
-                         ", allowed are " + allowedKeys());
+      constexpr std::array<uint32_t, 5> kSmallest{0, 0, 0x80, 0x800, 0x10000};
+      if (code < kSmallest.at(length) || code > 0x10ffff || (code >= 0xd800 && code < 0xe000)) {
+        return i;
       }
     }
-    for (const std::string_view key :
-         {kCameraModel, kIntrinsics, kDistortionModel, kDistortionCoeffs, kResolution}) {
-      if (!seen.contains(key)) fail(key, "is missing, needed are " + neededKeys());
-    }
+    i += length;
   }
+  return std::string_view::npos;
+}
 
-  [[nodiscard]] Camera camera() const {
-    const std::string camera_model = word(kCameraModel, camera_model_);
-    const std::string distortion_model = word(kDistortionModel, distortion_model_);
-    const auto* const known =
-        std::find_if(kKalibrModels.begin(), kKalibrModels.end(), [&](const KalibrModel& m) {
-          return m.camera_model == camera_model && m.distortion_model == distortion_model;
-        });
-    if (known == kKalibrModels.end()) {
-      std::string supported;
-      for (const KalibrModel& m : kKalibrModels) {
-        supported += (supported.empty() ? "" : ", ") + std::string(m.camera_model) + " with " +
-                     std::string(m.distortion_model);
-      }
-      fail(kCameraModel,
-           inQuotes(camera_model) + " with " + std::string(kDistortionModel) + " " +
-               inQuotes(distortion_model) + " is not supported, supported are " + supported);
-    }
-    const std::span<const ParamSpec> specs = paramSpecsOf(known->name);
-    std::vector<double> params;
-    readNumbers(kIntrinsics, intrinsics_, specs.first(known->intrinsics), &params);
-    readNumbers(kDistortionCoeffs, distortion_coeffs_, specs.subspan(known->intrinsics), &params);
-    const auto [width, height] = size();
-    try {
-      return makeCamera(known->name, params, width, height, maxFieldAngle());
-    } catch (const std::invalid_argument& e) {
-      throw InputError(file_ + ": " + name_ + ": " + e.what());
-    }
+void refuseNoText(std::string_view text, const std::string& source) {
+  if (text.size() > kMaxFileBytes) {
+    throw InputError(source + ": is larger than " + std::to_string(kMaxFileBytes) +
+                     " bytes, which no calibration file is");
   }
+  if (const size_t at = findNoText(text); at != std::string_view::npos) {
+    throw InputError(source + ": is not a text file in UTF-8: byte " + std::to_string(at + 1) +
+                     " is " + std::to_string(static_cast<unsigned char>(text[at])));
+  }
+  if (text.find_first_not_of(" \t\r\n") == std::string_view::npos) {
+    throw InputError(source + ": is empty, a calibration is expected");
+  }
+}
 
- private:
-  [[noreturn]] void fail(std::string_view key, const std::string& problem) const {
-    throw InputError(file_ + ": " + name_ + "." + std::string(key) + " " + problem);
+/// A number at the very end of a file may be a part of one.
+void refuseCutOff(std::string_view text, const std::string& source) {
+  const size_t last = text.find_last_not_of(" \t\r\n");
+  if (std::string_view("]}>\"'").find(text[last]) == std::string_view::npos &&
+      text.find('\n', last) == std::string_view::npos) {
+    throw InputError(source +
+                     ": ends without a line break and may be cut off: please add one if the file "
+                     "is complete");
   }
+}
 
-  static std::string neededKeys() {
-    std::string text;
-    for (const std::string_view key :
-         {kCameraModel, kIntrinsics, kDistortionModel, kDistortionCoeffs, kResolution}) {
-      text += (text.empty() ? "" : ", ") + std::string(key);
-    }
-    return text;
-  }
-  static std::string allowedKeys() {
-    std::string text = neededKeys() + ", " + std::string(kMaxFieldAngle);
-    for (const std::string_view key : kIgnoredKeys) text += ", " + std::string(key);
-    return text;
-  }
-
-  [[nodiscard]] std::string word(std::string_view key, const YAML::Node& node) const {
-    if (!node.IsScalar()) fail(key, "must be one word");
-    return node.Scalar();
-  }
-
-  /// Text of a number as written. yaml-cpp marks quoted text by the tag "!": that is not a number.
-  [[nodiscard]] std::string numberText(const std::string& key,
-                                       const YAML::Node& node,
-                                       const std::string& allowed) const {
-    if (!node.IsScalar()) fail(key, "must be a number, allowed is " + allowed);
-    if (node.Tag() == "!") {
-      fail(key, "= " + inQuotes(node.Scalar()) + " is text in quotes, allowed is " + allowed);
-    }
-    return node.Scalar();
-  }
-
-  [[nodiscard]] double number(const std::string& key,
-                              const YAML::Node& node,
-                              const std::string& allowed) const {
-    const std::string text = numberText(key, node, allowed);
-    const char* begin = text.data();
-    const char* const end = begin + text.size();
-    if (text.size() > 1 && text[0] == '+' && text[1] != '-') ++begin;
-    double value = 0;
-    const auto [stop, error] = std::from_chars(begin, end, value);
-    if (error != std::errc() || stop != end || !std::isfinite(value)) {
-      fail(key, "= " + inQuotes(text) + " is not a finite number, allowed is " + allowed);
-    }
-    return value;
-  }
-
-  void readNumbers(std::string_view key,
-                   const YAML::Node& node,
-                   std::span<const ParamSpec> specs,
-                   std::vector<double>* out) const {
-    std::string names;
-    for (const ParamSpec& spec : specs)
-      names += (names.empty() ? "" : ", ") + std::string(spec.name);
-    const std::string wanted =
-        "must be a list of " + std::to_string(specs.size()) + " numbers [" + names + "]";
-    if (!node.IsSequence()) fail(key, wanted);
-    if (node.size() != specs.size()) fail(key, wanted + ", got " + std::to_string(node.size()));
-    for (size_t i = 0; i < specs.size(); ++i) {
-      const ParamSpec& spec = specs[i];
-      const std::string place =
-          std::string(key) + "[" + std::to_string(i) + "] (" + std::string(spec.name) + ")";
-      const std::string allowed = range(spec.min, spec.max) + " " + std::string(spec.unit);
-      const double value = number(place, node[i], allowed);
-      if (!(value >= spec.min && value <= spec.max)) {
-        fail(place, "= " + shortest(value) + " is out of range, allowed is " + allowed);
-      }
-      out->push_back(value);
-    }
-  }
-
-  [[nodiscard]] std::pair<int, int> size() const {
-    if (!resolution_.IsSequence() || resolution_.size() != 2) {
-      fail(kResolution, "must be a list of 2 whole numbers [width, height]");
-    }
-    const std::string allowed =
-        "a whole number in [1, " + std::to_string(Camera::kMaxImageSize) + "]";
-    std::array<int, 2> size{};
-    for (size_t i = 0; i < 2; ++i) {
-      const std::string place =
-          std::string(kResolution) + (i == 0 ? "[0] (width)" : "[1] (height)");
-      const std::string text = numberText(place, resolution_[i], allowed);
-      const auto [stop, error] = std::from_chars(text.data(), text.data() + text.size(), size[i]);
-      if (error != std::errc() || stop != text.data() + text.size() || size[i] < 1 ||
-          size[i] > Camera::kMaxImageSize) {
-        fail(place, "= " + inQuotes(text) + " is out of range, allowed is " + allowed);
+/// The words of a text without its comments, line by line.
+std::vector<TextLine> linesOf(std::string_view text, const std::string& source) {
+  std::vector<TextLine> lines;
+  size_t words = 0;
+  for (int number = 1; !text.empty(); ++number) {
+    const size_t end = std::min(text.find('\n'), text.size());
+    std::string_view rest = text.substr(0, end);
+    text.remove_prefix(std::min(end + 1, text.size()));
+    rest = rest.substr(0, rest.find('#'));
+    TextLine line{number, {}};
+    for (;;) {
+      rest.remove_prefix(std::min(rest.find_first_not_of(" \t\r"), rest.size()));
+      if (rest.empty()) break;
+      Node word;
+      word.kind = Node::Kind::kScalar;
+      word.text = rest.substr(0, rest.find_first_of(" \t\r"));
+      rest.remove_prefix(word.text.size());
+      line.words.push_back(std::move(word));
+      if (++words > kMaxNodes) {
+        throw InputError(source + ": holds more than " + std::to_string(kMaxNodes) +
+                         " words, which no calibration file does");
       }
     }
-    return {size[0], size[1]};
+    if (!line.words.empty()) lines.push_back(std::move(line));
   }
+  return lines;
+}
 
-  [[nodiscard]] double maxFieldAngle() const {
-    if (!max_field_angle_) return M_PI;
-    const std::string allowed = "(0, " + shortest(M_PI) + "] rad";
-    const std::string key(kMaxFieldAngle);
-    const double value = number(key, *max_field_angle_, allowed);
-    if (!(value > 0 && value <= M_PI)) {
-      fail(key, "= " + shortest(value) + " is out of range, allowed is " + allowed);
+/// XML, JSON and YAML are known by how the first line that is no comment begins, or by its colon.
+bool looksLikeTree(std::string_view text) {
+  while (!text.empty()) {
+    std::string_view line = text.substr(0, std::min(text.find('\n'), text.size()));
+    text.remove_prefix(std::min(line.size() + 1, text.size()));
+    line.remove_prefix(std::min(line.find_first_not_of(" \t\r"), line.size()));
+    if (line.empty() || line[0] == '#') continue;
+    return std::string_view("<{[%").find(line[0]) != std::string_view::npos ||
+           line.starts_with("---") ||
+           line.substr(0, line.find('#')).find(':') != std::string_view::npos;
+  }
+  return true;
+}
+
+Document parse(std::string_view text, const std::string& source, bool tree) {
+  Document document;
+  document.source = source;
+  document.text = text;
+  document.tree = tree;
+  if (!tree) {
+    document.lines = linesOf(document.text, source);
+  } else if (text.substr(text.find_first_not_of(" \t\r\n")).starts_with('<')) {
+    document.root = parseOpencvXml(document.text, source);
+  } else {
+    document.root = parseYaml(document.text, source);
+    if (document.root.kind == Node::Kind::kNull) {
+      throw InputError(source + ": is empty, a calibration is expected");
     }
-    return value;
   }
+  return document;
+}
 
-  std::string file_, name_;
-  YAML::Node camera_model_, intrinsics_, distortion_model_, distortion_coeffs_, resolution_;
-  std::optional<YAML::Node> max_field_angle_;
-};
+const Format& recognise(const Document& document) {
+  std::vector<const Format*> found;
+  for (const Format& f : kFormats) {
+    if (f.recognises != nullptr && f.tree == document.tree && f.recognises(document)) {
+      found.push_back(&f);
+    }
+  }
+  if (found.empty()) {
+    const std::string key =
+        document.root.keys.empty()
+            ? ""
+            : " (its first key is " + inQuotes(document.root.keys.front()) + ")";
+    throw InputError(document.source + ": is not a calibration file of a known format" + key +
+                     ", known are " +
+                     formatNames([](const Format& f) { return f.recognises != nullptr; }));
+  }
+  if (found.size() > 1) {
+    throw InputError(document.source + ": may be " + std::string(found[0]->name) + " or " +
+                     std::string(found[1]->name) + ": please choose the format");
+  }
+  return *found.front();
+}
 
-YAML::Node parseYaml(const std::string& path, const std::string& text) {
-  std::vector<YAML::Node> documents;
-  try {
-    documents = YAML::LoadAll(text);
-  } catch (const YAML::Exception& e) {
-    throw InputError(path + ": is not complete and correct YAML: line " +
-                     std::to_string(e.mark.line + 1) + ", column " +
-                     std::to_string(e.mark.column + 1) + ": " + e.msg);
+LoadedCalibration parseChecked(std::string_view text,
+                               const std::string& source,
+                               std::string_view format) {
+  constexpr std::string_view kByteOrderMark = "\xef\xbb\xbf";
+  if (text.starts_with(kByteOrderMark)) text.remove_prefix(kByteOrderMark.size());
+  refuseNoText(text, source);
+  const auto* const forced = std::find_if(
+      kFormats.begin(), kFormats.end(), [&](const Format& f) { return f.name == format; });
+  if (!format.empty() && forced == kFormats.end()) {
+    throw InputError(source + ": unknown calibration format " + inQuotes(format) +
+                     ", allowed are " + formatNames([](const Format&) { return true; }));
   }
-  if (documents.empty() || (documents.size() == 1 && documents[0].IsNull())) {
-    throw InputError(path + ": is empty, a camchain with cam0, cam1, ... is expected");
-  }
-  if (documents.size() > 1) {
-    throw InputError(path + ": holds " + std::to_string(documents.size()) +
-                     " YAML documents, allowed is one");
-  }
-  return documents[0];
+  const Document document =
+      parse(text, source, format.empty() ? looksLikeTree(text) : forced->tree);
+  const Format& chosen = format.empty() ? recognise(document) : *forced;
+  Loaded loaded = chosen.read(document);
+  refuseCutOff(text, source);
+  return {std::string(chosen.name),
+          loaded.from_corner
+              ? "(0, 0) is the corner of the top left pixel in the file: 0.5 was "
+                "subtracted from cx and cy"
+              : "integer coordinates are pixel centres in the file, read as they are",
+          std::move(loaded.cameras)};
 }
 
 }  // namespace
 
-std::vector<NamedCamera> loadCameras(const std::string& path) {
-  const YAML::Node root = parseYaml(path, readFile(path));
-  if (!root.IsMap()) {
-    throw InputError(path + ": is not a Kalibr camchain: a map of cam0, cam1, ... is expected");
-  }
-  std::vector<NamedCamera> cameras;
-  std::set<std::string> seen;
-  for (const auto& item : root) {
-    const std::string name = item.first.IsScalar() ? item.first.Scalar() : "";
-    if (!isCameraName(name)) {
-      throw InputError(path + ": unknown key " + inQuotes(name) + ", allowed are cam0, cam1, ...");
-    }
-    if (!seen.insert(name).second) {
-      throw InputError(path + ": " + name + " is given twice, allowed is once");
-    }
-    cameras.push_back({name, CameraEntry(path, name, item.second).camera()});
-  }
-  if (cameras.empty()) {
-    throw InputError(path + ": holds no camera, cam0, cam1, ... are expected");
-  }
-  return cameras;
+std::optional<long> cameraNumber(std::string_view name) {
+  constexpr size_t kMaxDigits = 9;
+  constexpr std::string_view kPrefix = "cam";
+  if (!name.starts_with(kPrefix)) return std::nullopt;
+  name.remove_prefix(kPrefix.size());
+  const bool digits =
+      !name.empty() && name.size() <= kMaxDigits &&
+      std::all_of(name.begin(), name.end(), [](char c) { return c >= '0' && c <= '9'; });
+  if (!digits || (name.size() > 1 && name[0] == '0')) return std::nullopt;
+  long number = 0;
+  (void)std::from_chars(name.data(), name.data() + name.size(), number);
+  return number;
 }
 
-LoadedCalibration loadCalibration(const std::string& path, const std::string& format) {
-  if (!format.empty() && format != "kalibr") {
-    throw InputError(path + ": unknown calibration format " + inQuotes(format) +
-                     ", allowed is kalibr");
-  }
-  return {"kalibr", "integer coordinates are pixel centres, read as they are", loadCameras(path)};
+void refuseModel(const NamedCamera& camera,
+                 std::string_view format,
+                 std::span<const std::string_view> models) {
+  throw std::invalid_argument(camera.name + ": " + std::string(format) +
+                              " cannot say this camera of the model " +
+                              std::string(camera.camera.modelName()) + ", but " + listed(models) +
+                              ": please convert the camera to one of them first");
 }
 
-Camera loadCamera(const std::string& path_or_path_and_name) {
+const NamedCamera& onlyCamera(const std::vector<NamedCamera>& cameras, std::string_view format) {
+  if (cameras.size() != 1) {
+    throw std::invalid_argument("a file of the format " + std::string(format) +
+                                " holds one camera, got " + std::to_string(cameras.size()));
+  }
+  return cameras.front();
+}
+
+}  // namespace calib
+
+std::span<const CalibrationFormat> calibrationFormats() {
+  return calib::kPublicFormats;
+}
+
+LoadedCalibration parseCalibration(std::string_view text,
+                                   const std::string& source,
+                                   std::string_view format) {
+  try {
+    return calib::parseChecked(text, source, format);
+  } catch (const std::invalid_argument& e) {
+    throw InputError(source + ": " + e.what());
+  }
+}
+
+LoadedCalibration loadCalibration(const std::string& path, std::string_view format) {
+  return parseCalibration(readFile(path, calib::kMaxFileBytes), path, format);
+}
+
+std::vector<NamedCamera> loadCameras(const std::string& path, std::string_view format) {
+  return loadCalibration(path, format).cameras;
+}
+
+Camera loadCamera(const std::string& path_or_path_and_name, std::string_view format) {
   std::string path = path_or_path_and_name, name;
   std::error_code ignored;
   const size_t colon = path.rfind(':');
   if (!std::filesystem::exists(path, ignored) && colon != std::string::npos &&
-      std::filesystem::is_regular_file(path.substr(0, colon), ignored)) {
+      std::filesystem::exists(path.substr(0, colon), ignored) &&
+      !std::filesystem::is_directory(path.substr(0, colon), ignored)) {
     name = path.substr(colon + 1);
     path.resize(colon);
   }
-  const std::vector<NamedCamera> cameras = loadCameras(path);
+  const std::vector<NamedCamera> cameras = loadCameras(path, format);
+  const auto names = [&] {
+    constexpr size_t kMaxShown = 10;
+    std::string text;
+    for (size_t i = 0; i < std::min(cameras.size(), kMaxShown); ++i) {
+      text += (i > 0 ? ", " : "") + cameras[i].name;
+    }
+    return cameras.size() > kMaxShown ? text + ", ..." : text;
+  };
   if (path == path_or_path_and_name) {
     if (cameras.size() != 1) {
       throw InputError(path + ": holds " + std::to_string(cameras.size()) +
-                       " cameras, choose one of " + camerasText(cameras) + " as in " + path + ":" +
+                       " cameras, choose one of " + names() + " as in " + path + ":" +
                        cameras.front().name);
     }
     return cameras.front().camera;
@@ -336,53 +338,44 @@ Camera loadCamera(const std::string& path_or_path_and_name) {
   for (const NamedCamera& c : cameras) {
     if (c.name == name) return c.camera;
   }
-  throw InputError(path + ": holds no camera " + inQuotes(name) + ", allowed are " +
-                   camerasText(cameras));
+  throw InputError(path + ": holds no camera " + calib::inQuotes(name) + ", allowed are " +
+                   names());
+}
+
+std::string calibrationText(const std::vector<NamedCamera>& cameras, std::string_view format) {
+  const auto* const known =
+      std::find_if(calib::kFormats.begin(), calib::kFormats.end(), [&](const calib::Format& f) {
+        return f.name == format && f.write != nullptr;
+      });
+  if (known == calib::kFormats.end()) {
+    throw std::invalid_argument(
+        "calibrations cannot be written in the format " + calib::inQuotes(format) +
+        ", allowed are " +
+        calib::formatNames([](const calib::Format& f) { return f.write != nullptr; }));
+  }
+  if (cameras.empty()) throw std::invalid_argument("a calibration needs at least one camera");
+  std::set<std::string> seen;
+  for (const NamedCamera& entry : cameras) {
+    if (!calib::cameraNumber(entry.name) || !seen.insert(entry.name).second) {
+      throw std::invalid_argument("camera name " + calib::inQuotes(entry.name) +
+                                  " in a calibration: allowed are cam0, cam1, ..., each once");
+    }
+  }
+  return known->write(cameras);
+}
+
+void saveCalibration(const std::string& path,
+                     const std::vector<NamedCamera>& cameras,
+                     std::string_view format) {
+  writeFileAtomically(path, calibrationText(cameras, format));
 }
 
 std::string kalibrYaml(const std::vector<NamedCamera>& cameras) {
-  if (cameras.empty()) throw std::invalid_argument("a camchain needs at least one camera");
-  std::set<std::string> seen;
-  std::string text;
-  for (const NamedCamera& entry : cameras) {
-    const std::string& name = entry.name;
-    const Camera& camera = entry.camera;
-    if (!isCameraName(name) || !seen.insert(name).second) {
-      throw std::invalid_argument("camera name " + inQuotes(name) +
-                                  " in a camchain: allowed are cam0, cam1, ..., each once");
-    }
-    const auto* const known =
-        std::find_if(kKalibrModels.begin(), kKalibrModels.end(), [&](const KalibrModel& m) {
-          return m.name == camera.modelName();
-        });
-    if (known == kKalibrModels.end()) {
-      throw std::invalid_argument(name + ": a camchain cannot say the model " +
-                                  std::string(camera.modelName()));
-    }
-    const std::vector<double> params = camera.params();
-    const auto list = [&](size_t begin, size_t end) {
-      std::string out = "[";
-      for (size_t i = begin; i < end; ++i) out += (i > begin ? ", " : "") + yamlNumber(params[i]);
-      return out + "]\n";
-    };
-    text += name + ":\n";
-    text += "  camera_model: " + std::string(known->camera_model) + "\n";
-    text += "  intrinsics: " + list(0, known->intrinsics);
-    text += "  distortion_model: " + std::string(known->distortion_model) + "\n";
-    text += "  distortion_coeffs: " + list(known->intrinsics, params.size());
-    // Before the resolution: a file cut off anywhere then lacks a key or a bracket.
-    if (camera.maxFieldAngleLimit() < M_PI) {
-      text += "  max_field_angle: " + yamlNumber(camera.maxFieldAngleLimit()) +
-              "  # rad from the optical axis; an extension of dlsd, unknown to Kalibr\n";
-    }
-    text += "  resolution: [" + std::to_string(camera.width()) + ", " +
-            std::to_string(camera.height()) + "]\n";
-  }
-  return text;
+  return calibrationText(cameras, "kalibr");
 }
 
 void saveCameras(const std::string& path, const std::vector<NamedCamera>& cameras) {
-  writeFileAtomically(path, kalibrYaml(cameras));
+  saveCalibration(path, cameras, "kalibr");
 }
 
 }  // namespace dlsd

@@ -190,20 +190,23 @@ TEST_F(Calibration, AFileCutOffAnywhereIsRefused) {
 TEST_F(Calibration, FilesThatAreNoCamchainAreRefused) {
   EXPECT_THAT(refusal(""), HasSubstr("is empty"));
   EXPECT_THAT(refusal("\n# nothing\n"), HasSubstr("is empty"));
-  EXPECT_THAT(refusal("{}"), HasSubstr("holds no camera"));
-  EXPECT_THAT(refusal("just words"), HasSubstr("not a Kalibr camchain"));
-  EXPECT_THAT(refusal("- cam0\n- cam1\n"), HasSubstr("not a Kalibr camchain"));
-  EXPECT_THAT(refusal("fx: 3\n"), AllOf(HasSubstr("\"fx\""), HasSubstr("cam0, cam1")));
+  EXPECT_THAT(refusal("{}"), HasSubstr("not a calibration file of a known format"));
+  EXPECT_THAT(refusal("just words"), HasSubstr("not a calibration file of a known format"));
+  EXPECT_THAT(refusal("- cam0\n- cam1\n"), HasSubstr("not a calibration file of a known format"));
+  EXPECT_THAT(refusal("fx: 3\n"), AllOf(HasSubstr("\"fx\""), HasSubstr("known are kalibr")));
   EXPECT_THAT(refusal("cam01:\n  a: 1\n"), HasSubstr("\"cam01\""));
-  EXPECT_THAT(refusal("[a, b]: 1\n"), HasSubstr("unknown key"));
+  EXPECT_THAT(refusal("[a, b]: 1\n"), HasSubstr("plain word"));
   EXPECT_THAT(refusal("cam0: 5\n"), HasSubstr("cam0 must be a map"));
   EXPECT_THAT(refusal("cam0: [1, 2]\n"), HasSubstr("cam0 must be a map"));
   EXPECT_THAT(refusal("cam0:\n"), HasSubstr("cam0 must be a map"));
   EXPECT_THAT(refusal("cam0:\n  [1]: 2\n"), HasSubstr("plain word"));
-  EXPECT_THAT(refusal(entryWith() + "---\n" + entryWith()), HasSubstr("2 YAML documents"));
+  EXPECT_THAT(refusal(entryWith() + "---\n" + entryWith()),
+              HasSubstr("more than one YAML document"));
   EXPECT_THAT(refusal("cam0: {camera_model: pinhole"), HasSubstr("line 1, column"));
   EXPECT_THAT(refusal("cam0:\n\t- x: [}"), HasSubstr("YAML"));
-  EXPECT_THAT(refusal(std::string(100'000, '[')), HasSubstr("YAML"));
+  EXPECT_FALSE(refusal(std::string(100'000, '[')).empty());
+  EXPECT_THAT(refusal("cam0: " + std::string(40, '[') + std::string(40, ']')),
+              HasSubstr("deeper than 32 levels"));
   std::string rubbish;
   for (unsigned i = 0, x = 1; i < 4096; ++i) {
     x = x * 1664525U + 1013904223U;
@@ -241,11 +244,10 @@ TEST_F(Calibration, KeysMustBeKnownPresentAndSingle) {
 
 TEST_F(Calibration, ModelsThatWeDoNotHaveAreNamedWithThoseWeHave) {
   for (const auto& [camera_model, distortion_model] :
-       std::initializer_list<std::pair<std::string, std::string>>{{"pinhole", "radtan"},
-                                                                  {"omni", "radtan"},
+       std::initializer_list<std::pair<std::string, std::string>>{{"pinhole", "radtan8"},
                                                                   {"omni", "equidistant"},
-                                                                  {"eucm", "none"},
-                                                                  {"ds", "none"},
+                                                                  {"eucm", "radtan"},
+                                                                  {"ds", "fov"},
                                                                   {"Pinhole", "none"},
                                                                   {"", ""}}) {
     EXPECT_THAT(refusal("cam0:\n  camera_model: '" + camera_model + "'\n  distortion_model: '" +
@@ -254,7 +256,7 @@ TEST_F(Calibration, ModelsThatWeDoNotHaveAreNamedWithThoseWeHave) {
                 AllOf(HasSubstr("\"" + camera_model + "\" with"),
                       HasSubstr("\"" + distortion_model + "\" is not supported"),
                       HasSubstr("pinhole with none, pinhole with fov, pinhole with equidistant, "
-                                "omni with none")));
+                                "pinhole with radtan, omni with none")));
   }
   EXPECT_THAT(refusal(entryWith("camera_model", "camera_model: [pinhole]")), HasSubstr("one word"));
   EXPECT_THAT(refusal(entryWith("distortion_model", "distortion_model:")), HasSubstr("one word"));

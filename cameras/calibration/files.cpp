@@ -4,6 +4,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <atomic>
 #include <cerrno>
 #include <cstring>
@@ -54,14 +55,15 @@ int writeAllAndClose(FileDescriptor& file, std::string_view content) {
 
 }  // namespace
 
-std::string readFile(const std::string& path) {
+std::string readFile(const std::string& path, size_t max_bytes) {
   FileDescriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
   if (file.get() < 0) throw InputError(path + ": cannot be read: " + reason(errno));
   std::string content;
   struct stat status {};
   if (::fstat(file.get(), &status) == 0) {
     if (S_ISDIR(status.st_mode)) throw InputError(path + ": is a folder, a file is expected");
-    if (status.st_size > 0) content.reserve(static_cast<size_t>(status.st_size));
+    if (status.st_size > 0)
+      content.reserve(std::min(static_cast<size_t>(status.st_size), max_bytes));
   }
   char buffer[1 << 16];
   for (;;) {
@@ -72,6 +74,10 @@ std::string readFile(const std::string& path) {
     }
     if (n == 0) return content;
     content.append(buffer, static_cast<size_t>(n));
+    if (content.size() > max_bytes) {
+      throw InputError(path + ": is larger than " + std::to_string(max_bytes) +
+                       " bytes, which no file of its kind is");
+    }
   }
 }
 

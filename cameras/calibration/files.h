@@ -2,6 +2,8 @@
 // Files and their errors, for every module that reads or writes one. The command line turns
 // InputError and std::invalid_argument into exit code 2, SystemError into 3.
 
+#include <cstddef>
+#include <cstdint>
 #include <stdexcept>
 #include <string>
 #include <string_view>
@@ -19,8 +21,9 @@ struct SystemError : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// Whole content of a file. Throws InputError if it does not exist, is a folder or can't be read.
-[[nodiscard]] std::string readFile(const std::string& path);
+/// Whole content of a file. Throws InputError if it does not exist, is a folder, can't be read or
+/// holds more than max_bytes.
+[[nodiscard]] std::string readFile(const std::string& path, size_t max_bytes = SIZE_MAX);
 
 /// Writes to a temporary file in the same folder and renames it, so that `path` is either absent,
 /// old or complete. Parent folders must exist. Throws SystemError naming the path and the reason.
