@@ -35,10 +35,6 @@ M makeChecked(const std::array<double, M::kParams.size()>& values) {
   return M::fromParams(values);
 }
 
-double fieldAngle(const Eigen::Vector3d& ray) {
-  return std::atan2(std::hypot(ray.x(), ray.y()), ray.z());
-}
-
 template <size_t I = 0>
 std::string modelNames() {
   if constexpr (I < std::variant_size_v<CameraModelVariant>) {
@@ -93,7 +89,8 @@ Camera::Camera(const CameraModelVariant& model, int width, int height, double ma
           model)),
       width_(width),
       height_(height),
-      max_field_angle_rad_(max_field_angle_rad) {
+      max_field_angle_rad_(max_field_angle_rad),
+      angle_limit_(FieldAngleLimit::of(max_field_angle_rad)) {
   const std::string sizes = rangeText(1, kMaxImageSize);
   if (width < 1 || width > kMaxImageSize) fail("image width", width, sizes);
   if (height < 1 || height > kMaxImageSize) fail("image height", height, sizes);
@@ -133,7 +130,8 @@ std::optional<Eigen::Vector2d> Camera::project(const Eigen::Vector3d& ray_in_cam
       [&](const auto& m) { return m.project(ray_in_cam.x(), ray_in_cam.y(), ray_in_cam.z()); },
       model_);
   if (!p.valid) return std::nullopt;
-  if (max_field_angle_rad_ < M_PI && !(fieldAngle(ray_in_cam) <= max_field_angle_rad_)) {
+  if (max_field_angle_rad_ < M_PI &&
+      !angle_limit_.admits(ray_in_cam.x(), ray_in_cam.y(), ray_in_cam.z())) {
     return std::nullopt;
   }
   return Eigen::Vector2d(p.u, p.v);
@@ -144,7 +142,7 @@ std::optional<Eigen::Vector3d> Camera::unproject(const Eigen::Vector2d& pixel) c
       std::visit([&](const auto& m) { return m.unproject(pixel.x(), pixel.y()); }, model_);
   if (!r.valid) return std::nullopt;
   const Eigen::Vector3d ray(r.x, r.y, r.z);
-  if (max_field_angle_rad_ < M_PI && !(fieldAngle(ray) <= max_field_angle_rad_)) {
+  if (max_field_angle_rad_ < M_PI && !angle_limit_.admits(r.x, r.y, r.z)) {
     return std::nullopt;
   }
   return ray;

@@ -44,6 +44,8 @@ class Camera {
   [[nodiscard]] int height() const { return height_; }
   /// As given to the constructor.
   [[nodiscard]] double maxFieldAngleLimit() const { return max_field_angle_rad_; }
+  /// The same as a test of rays. Only for limits below pi.
+  [[nodiscard]] const FieldAngleLimit& angleLimit() const { return angle_limit_; }
   /// Supremum of the angle to +z (rad) of rays that project: the smaller of
   /// model's and limit.
   [[nodiscard]] double maxFieldAngle() const;
@@ -75,6 +77,7 @@ class Camera {
   CameraModelVariant model_;
   int width_, height_;
   double max_field_angle_rad_;
+  FieldAngleLimit angle_limit_;
 };
 
 /// Parameter table of a model by its kName. Throws std::invalid_argument for an

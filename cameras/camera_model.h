@@ -8,17 +8,25 @@
 //   project   (x, y, z) in the camera frame, any positive scale  ->  pixel
 //   unproject (u, v)                                             ->  unit ray in the camera frame
 //
+// Both are kernels without branches or library calls (fast_math.h) and always inlined, so that one
+// point and a vectorised loop over many (batch.h) run the same operations and give the same bits.
+// A model whose inverse needs an iteration has `attemptUnproject` besides: a fixed number of steps
+// that answers nearly every pixel and says so; unproject takes that or iterates.
+//
 // Camera frame: x right, y down, z forward. Pixel: integer coordinates are pixel centres.
 // Outside its domain a model answers `valid == false`; the values are then unspecified and must not
 // be read. valid implies finite. Whether a pixel lies inside the image is a separate question
 // (camera.h).
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <concepts>
 #include <limits>
 #include <string_view>
+
+#include "cameras/fast_math.h"
 
 namespace dlsd {
 
@@ -55,12 +63,17 @@ inline constexpr float kMinNorm2f = 1e-20F;
 inline constexpr float kMaxNorm2f = 1e+20F;
 
 template <class T>
-[[nodiscard]] constexpr bool norm2InRange(T norm2) {
-  if constexpr (std::is_same_v<T, float>) {
-    return norm2 > kMinNorm2f && norm2 < kMaxNorm2f;
-  } else {
-    return norm2 > T(kMinNorm2) && norm2 < T(kMaxNorm2);
-  }
+[[nodiscard, gnu::always_inline]] constexpr bool norm2InRange(T norm2) {
+  constexpr T kMin = std::is_same_v<T, float> ? T(kMinNorm2f) : T(kMinNorm2);
+  constexpr T kMax = std::is_same_v<T, float> ? T(kMaxNorm2f) : T(kMaxNorm2);
+  return allOf(norm2 > kMin, norm2 < kMax);
+}
+
+/// sqrt(r2), but never 0: below the least normal number its root, where every model is linear in r.
+/// So a quotient by it needs no case for the optical axis.
+template <class T>
+[[nodiscard, gnu::always_inline]] inline T axisDistance(T r2) {
+  return std::sqrt(std::max(r2, std::numeric_limits<T>::min()));
 }
 
 /// Pixel coordinates beyond this are answered as invalid: 1e9 px is far outside any image, and
@@ -68,9 +81,31 @@ template <class T>
 inline constexpr double kMaxPixel = 1e9;
 
 template <class T>
-[[nodiscard]] inline bool pixelInRange(T u, T v) {
-  return std::abs(u) <= T(kMaxPixel) && std::abs(v) <= T(kMaxPixel);
+[[nodiscard, gnu::always_inline]] inline bool pixelInRange(T u, T v) {
+  return allOf(std::abs(u) <= T(kMaxPixel), std::abs(v) <= T(kMaxPixel));
 }
+
+/// Whether the angle of a ray to +z is at most a limit in (0, pi): sin(limit - angle) >= 0.
+struct FieldAngleLimit {
+  double sine, cosine;  ///< Of the limit.
+
+  [[nodiscard]] static FieldAngleLimit of(double limit_rad) {
+    return {std::sin(limit_rad), std::cos(limit_rad)};
+  }
+  bool operator==(const FieldAngleLimit&) const = default;
+
+  template <class T>
+  [[nodiscard, gnu::always_inline]] bool admits(T x, T y, T z) const {
+    return z * T(sine) >= std::sqrt(x * x + y * y) * T(cosine);
+  }
+};
+
+/// Answer of a kernel of fixed length where only an iteration can answer every case.
+template <class Answer>
+struct Attempt {
+  Answer answer;
+  bool settled;  ///< If not, `answer` says nothing.
+};
 
 template <class M>
 concept CameraModel = std::regular<M> &&

@@ -35,41 +35,36 @@ struct Fov {
   bool operator==(const Fov&) const = default;
 
   template <class T>
-  [[nodiscard]] Pixel<T> project(T x, T y, T z) const {
+  [[nodiscard, gnu::always_inline]] Pixel<T> project(T x, T y, T z) const {
+    const bool pinhole = omega < kPinholeOmega;
     const T r2 = x * x + y * y;
-    const bool size_ok = norm2InRange(r2 + z * z);
-    if (omega < kPinholeOmega) {
-      const T u = T(fx) * (x / z) + T(cx);
-      const T v = T(fy) * (y / z) + T(cy);
-      return {u, v, z > T(0) && size_ok && pixelInRange(u, v)};
-    }
-    const T r = std::sqrt(r2);
-    const T alpha = std::atan2(T(two_tan_half_omega) * r, z);
-    // On the axis (r = 0, z > 0): r_d / r -> 2 tan(omega / 2) / (omega z).
-    const T scale = r > T(0) ? alpha / (T(omega) * r) : T(two_tan_half_omega / omega) / z;
+    const T r = axisDistance(r2);
+    const T r_d = polarAngle(T(two_tan_half_omega) * r, z) * T(1 / omega);
+    const T scale = select(pinhole, T(1), r_d) / select(pinhole, z, r);
     const T u = T(fx) * (x * scale) + T(cx);
     const T v = T(fy) * (y * scale) + T(cy);
     // Not alpha < pi: for small omega alpha rounds to pi while the ray is still far from -z.
-    return {u, v, (r > T(0) || z > T(0)) && size_ok && pixelInRange(u, v)};
+    const bool off_axis = allOf(r2 >= std::numeric_limits<T>::min(), !pinhole);
+    return {u, v, allOf(anyOf(z > T(0), off_axis), norm2InRange(r2 + z * z), pixelInRange(u, v))};
   }
 
   template <class T>
-  [[nodiscard]] Ray<T> unproject(T u, T v) const {
-    const T mx = (u - T(cx)) / T(fx);
-    const T my = (v - T(cy)) / T(fy);
-    const T r_d = std::sqrt(mx * mx + my * my);
-    if (omega < kPinholeOmega) {
-      const T s = T(1) / std::sqrt(r_d * r_d + T(1));
-      return {mx * s, my * s, s, pixelInRange(u, v)};
-    }
+  [[nodiscard, gnu::always_inline]] Ray<T> unproject(T u, T v) const {
+    const bool pinhole = omega < kPinholeOmega;
+    const T mx = (u - T(cx)) * (T(1) / T(fx));
+    const T my = (v - T(cy)) * (T(1) / T(fy));
+    const T r_d = axisDistance(mx * mx + my * my);
     const T alpha = r_d * T(omega);
-    const T sin_a = std::sin(alpha);
-    const T cos_a = std::cos(alpha);
+    const auto [sin_a, cos_a] = sinCos(alpha);
     // (r, z) is along (sin(alpha) / (2 tan(omega / 2)), cos(alpha)).
-    const T radial = sin_a / T(two_tan_half_omega);
-    const T inv_norm = T(1) / std::sqrt(radial * radial + cos_a * cos_a);
-    const T scale = (r_d > T(0) ? radial / r_d : T(omega / two_tan_half_omega)) * inv_norm;
-    return {mx * scale, my * scale, cos_a * inv_norm, alpha < T(M_PI) && pixelInRange(u, v)};
+    const T r = select(pinhole, r_d, sin_a * T(1 / two_tan_half_omega));
+    const T z = select(pinhole, T(1), cos_a);
+    const T inv_norm = T(1) / std::sqrt(r * r + z * z);
+    const T scale = (r * (T(1) / r_d)) * inv_norm;
+    return {mx * scale,
+            my * scale,
+            z * inv_norm,
+            allOf(anyOf(pinhole, alpha < T(M_PI)), pixelInRange(u, v))};
   }
 
   [[nodiscard]] ProjectionJacobian jacobian(double x, double y, double z) const {

@@ -2,6 +2,7 @@
 #include <algorithm>
 
 #include "cameras/camera_model.h"
+#include "cameras/newton.h"
 #include "cameras/polynomial.h"
 
 namespace dlsd {
@@ -13,9 +14,12 @@ namespace dlsd {
 ///
 /// Domain: theta < max_theta, where max_theta is the smallest positive sign change of d'(theta), or
 /// pi if there is none below pi; pixels of radius r_d < d(max_theta). Solved once in fromParams.
-/// The inverse is a Newton iteration inside a bracket that always holds the solution, run to the
-/// last bits: it cannot end anywhere else, so no residual has to be judged. Source: Kannala and
-/// Brandt, "A generic camera model ..." (PAMI 2006), radial part only.
+///
+/// Inverse: theta / r_d, fitted when the camera is made as a polynomial in 1 - sqrt(1 - r_d / R),
+/// which takes the root out of a fold at R, and two of Newton's steps. Where these have not arrived
+/// (near folds and inflections, or beyond kStartAngle), Newton's iteration inside a bracket that
+/// always holds the solution. Source: Kannala and Brandt, "A generic camera model ..." (PAMI 2006),
+/// radial part only.
 struct KannalaBrandt {
   static constexpr std::string_view kName = "kannala_brandt";
   static constexpr std::array<ParamSpec, 8> kParams{{
@@ -32,6 +36,9 @@ struct KannalaBrandt {
   double fx = 1, fy = 1, cx = 0, cy = 0, k1 = 0, k2 = 0, k3 = 0, k4 = 0;
   double max_theta = M_PI;   ///< Derived, rad.
   double max_radius = M_PI;  ///< Derived: d(max_theta).
+  /// Derived: the fit for the start, and its R.
+  std::array<double, 10> start{};
+  double start_radius = M_PI;
 
   [[nodiscard]] static KannalaBrandt fromParams(const std::array<double, 8>& p) {
     KannalaBrandt m{p[0], p[1], p[2], p[3], p[4], p[5], p[6], p[7]};
@@ -40,80 +47,142 @@ struct KannalaBrandt {
     const std::vector<double> turns = signChanges(slope, 0, M_PI * M_PI);
     if (!turns.empty()) m.max_theta = std::min(std::sqrt(turns.front()), M_PI);
     m.max_radius = m.distort(m.max_theta);
+    m.fitStart();
     return m;
   }
   [[nodiscard]] std::array<double, 8> params() const { return {fx, fy, cx, cy, k1, k2, k3, k4}; }
   bool operator==(const KannalaBrandt&) const = default;
 
   template <class T>
-  [[nodiscard]] T distort(T theta) const {
+  [[nodiscard, gnu::always_inline]] T distort(T theta) const {
     const T t = theta * theta;
-    return theta * (T(1) + t * (T(k1) + t * (T(k2) + t * (T(k3) + t * T(k4)))));
+    return theta + (theta * t) * distortion(t);
   }
   template <class T>
-  [[nodiscard]] T distortSlope(T theta) const {
+  [[nodiscard, gnu::always_inline]] T distortSlope(T theta) const {
     const T t = theta * theta;
-    return T(1) + t * (T(3 * k1) + t * (T(5 * k2) + t * (T(7 * k3) + t * T(9 * k4))));
+    return T(1) + t * ((T(3 * k1) + t * T(5 * k2)) + (t * t) * (T(7 * k3) + t * T(9 * k4)));
   }
 
   template <class T>
-  [[nodiscard]] Pixel<T> project(T x, T y, T z) const {
+  [[nodiscard, gnu::always_inline]] Pixel<T> project(T x, T y, T z) const {
     const T r2 = x * x + y * y;
-    const T r = std::sqrt(r2);
-    const T theta = std::atan2(r, z);
-    const T scale = r > T(0) ? distort(theta) / r : T(1) / z;
+    const T r = axisDistance(r2);
+    const T theta = polarAngle(r, z);
+    const T scale = distort(theta) * (T(1) / r);
     const T u = T(fx) * (x * scale) + T(cx);
     const T v = T(fy) * (y * scale) + T(cy);
-    return {u, v, theta < T(max_theta) && norm2InRange(r2 + z * z) && pixelInRange(u, v)};
+    return {u, v, allOf(theta < T(max_theta), norm2InRange(r2 + z * z), pixelInRange(u, v))};
   }
 
   template <class T>
-  [[nodiscard]] Ray<T> unproject(T u, T v) const {
-    const T mx = (u - T(cx)) / T(fx);
-    const T my = (v - T(cy)) / T(fy);
-    const T r_d = std::sqrt(mx * mx + my * my);
-    if (!(r_d < T(max_radius)) || !pixelInRange(u, v)) return {T(0), T(0), T(1), false};
-    const T theta = undistort(r_d);
-    const T scale = r_d > T(0) ? std::sin(theta) / r_d : T(1);
-    return {mx * scale, my * scale, std::cos(theta), theta < T(max_theta)};
+  [[nodiscard, gnu::always_inline]] Ray<T> unproject(T u, T v) const {
+    const auto [ray, settled] = attemptUnproject(u, v);
+    return settled ? ray : iterateUnproject(u, v);
+  }
+
+  template <class T>
+  [[nodiscard, gnu::always_inline]] Attempt<Ray<T>> attemptUnproject(T u, T v) const {
+    const Radial<T> m = radial(u, v);
+    T theta = startFor(m.r_d);
+    T slope, step, curvature;
+    // Each step squares the error: 1e-5, 1e-10, 1e-20 where the fit is good.
+    for (int i = 0; i < (std::is_same_v<T, float> ? 1 : 2); ++i) {
+      const T t = theta * theta;
+      slope = distortSlope(theta);
+      curvature =
+          T(6 * k1) + t * ((T(20 * k2) + t * T(42 * k3)) + (t * t) * T(72 * k4));  // d''/theta
+      // theta - r_d is exact, so the error is that of the distortion alone.
+      step = ((theta - m.r_d) + (theta * t) * distortion(t)) / slope;
+      theta -= step;
+    }
+    // What Newton's step leaves, step^2 d'' / (2 d'), is below the rounding of theta.
+    constexpr T kEpsilon = std::numeric_limits<T>::epsilon();
+    const bool arrived = allOf((step * step) * std::abs(curvature) <= (kEpsilon / 2) * slope,
+                               theta > T(0),
+                               theta < T(max_theta));
+    return {rayAt(m, theta), anyOf(arrived, !m.valid)};
   }
 
   /// theta in [0, max_theta] with d(theta) = r_d, for 0 <= r_d < max_radius.
   template <class T>
   [[nodiscard]] T undistort(T r_d) const {
-    T lo = 0, hi = T(max_theta);
-    T theta = r_d < hi / 2 ? r_d : hi / 2;
-    T last_step = hi;
-    // Each step at least halves the bracket or the step before the last: 200 bound the worst fold.
-    for (int i = 0; i < 200; ++i) {
-      const T f = distort(theta) - r_d;
-      if (f == T(0)) break;
-      (f < T(0) ? lo : hi) = theta;
-      T next = theta - f / distortSlope(theta);
-      if (!(next > lo && next < hi && std::abs(next - theta) <= last_step / 2)) {
-        next = lo + (hi - lo) / 2;
-      }
-      last_step = std::abs(next - theta);
-      theta = next;
-      if (last_step <= std::numeric_limits<T>::epsilon() / 2 * theta) break;
-    }
-    // What the polynomial's own rounding leaves, by one more step in higher precision.
-    const auto slope = static_cast<long double>(distortSlope(theta));
-    const long double correction =
-        (distort(static_cast<long double>(theta)) - static_cast<long double>(r_d)) / slope;
-    const T polished = static_cast<T>(static_cast<long double>(theta) - correction);
-    return polished >= lo && polished <= hi ? polished : theta;
+    const T hi = T(max_theta);
+    return bracketedRoot(
+        [&](T theta) -> ValueAndSlope<T> {
+          const T t = theta * theta;
+          return {(theta - r_d) + (theta * t) * distortion(t), distortSlope(theta)};
+        },
+        T(0),
+        hi,
+        std::min(r_d, hi / 2));
   }
 
   [[nodiscard]] ProjectionJacobian jacobian(double x, double y, double z) const {
     const double r = std::sqrt(x * x + y * y);  // 0 where project takes its limit, too.
-    const double theta = std::atan2(r, z);
+    const double theta = polarAngle(r, z);
     const double slope = distortSlope(theta) / (r * r + z * z);
     const double s = r > 0 ? distort(theta) / r : 1 / z;
     return radialJacobian(fx, fy, x, y, s, slope * z, -slope * r);
   }
 
   [[nodiscard]] double maxFieldAngle() const { return max_theta; }
+
+ private:
+  /// Up to here the start is fitted; few lenses see further.
+  static constexpr double kStartAngle = 2.0;
+
+  /// A pixel in units of the focal lengths, and its distance from the principal point.
+  template <class T>
+  struct Radial {
+    T x, y, r_d;
+    bool valid;
+  };
+  template <class T>
+  [[nodiscard, gnu::always_inline]] Radial<T> radial(T u, T v) const {
+    const T mx = (u - T(cx)) * (T(1) / T(fx));
+    const T my = (v - T(cy)) * (T(1) / T(fy));
+    const T r_d = axisDistance(mx * mx + my * my);
+    return {mx, my, r_d, allOf(r_d < T(max_radius), pixelInRange(u, v))};
+  }
+  template <class T>
+  [[nodiscard, gnu::always_inline]] Ray<T> rayAt(const Radial<T>& m, T theta) const {
+    const auto [sine, cosine] = sinCos(theta);
+    const T scale = sine * (T(1) / m.r_d);
+    return {m.x * scale, m.y * scale, cosine, allOf(m.valid, theta < T(max_theta))};
+  }
+
+  template <class T>
+  [[nodiscard]] Ray<T> iterateUnproject(T u, T v) const {
+    const Radial<T> m = radial(u, v);
+    return rayAt(m, m.valid ? undistort(m.r_d) : T(0));
+  }
+
+  /// d(theta) = theta + theta t distortion(t), t = theta^2.
+  template <class T>
+  [[nodiscard, gnu::always_inline]] T distortion(T t) const {
+    return (T(k1) + t * T(k2)) + (t * t) * (T(k3) + t * T(k4));
+  }
+
+  /// Where Newton's steps start; not a number beyond start_radius.
+  template <class T>
+  [[nodiscard, gnu::always_inline]] T startFor(T r_d) const {
+    const T w = T(1) - std::sqrt(T(1) - r_d * T(1 / start_radius));
+    const T w2 = w * w, w4 = w2 * w2;
+    const auto pair = [&](size_t i) { return T(start[i]) + w * T(start[i + 1]); };
+    return r_d * ((pair(0) + w2 * pair(2)) + w4 * ((pair(4) + w2 * pair(6)) + w4 * pair(8)));
+  }
+
+  void fitStart() {
+    const double angle = std::min(max_theta, kStartAngle), radius = distort(angle);
+    // A fold just beyond the end of the fit needs the root as well.
+    start_radius = std::min(max_radius, 1.1 * radius);
+    const double w_end = 1 - std::sqrt(std::max(0.0, 1 - radius / start_radius));
+    start = interpolateAtChebyshevNodes<10>(w_end, [&](double w) {
+      const double r_d = start_radius * w * (2 - w);
+      return undistort(r_d) / r_d;
+    });
+  }
 };
 static_assert(CameraModel<KannalaBrandt>);
 

@@ -24,16 +24,17 @@ struct Pinhole {
   bool operator==(const Pinhole&) const = default;
 
   template <class T>
-  [[nodiscard]] Pixel<T> project(T x, T y, T z) const {
-    const T u = T(fx) * (x / z) + T(cx);
-    const T v = T(fy) * (y / z) + T(cy);
-    return {u, v, z > T(0) && norm2InRange(x * x + y * y + z * z) && pixelInRange(u, v)};
+  [[nodiscard, gnu::always_inline]] Pixel<T> project(T x, T y, T z) const {
+    const T scale = T(1) / z;
+    const T u = T(fx) * (x * scale) + T(cx);
+    const T v = T(fy) * (y * scale) + T(cy);
+    return {u, v, allOf(z > T(0), norm2InRange(x * x + y * y + z * z), pixelInRange(u, v))};
   }
 
   template <class T>
-  [[nodiscard]] Ray<T> unproject(T u, T v) const {
-    const T mx = (u - T(cx)) / T(fx);
-    const T my = (v - T(cy)) / T(fy);
+  [[nodiscard, gnu::always_inline]] Ray<T> unproject(T u, T v) const {
+    const T mx = (u - T(cx)) * (T(1) / T(fx));
+    const T my = (v - T(cy)) * (T(1) / T(fy));
     const T s = T(1) / std::sqrt(mx * mx + my * my + T(1));
     return {mx * s, my * s, s, pixelInRange(u, v)};
   }

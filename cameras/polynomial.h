@@ -1,5 +1,7 @@
 #pragma once
+#include <array>
 #include <cmath>
+#include <cstddef>
 #include <optional>
 #include <span>
 #include <vector>
@@ -43,6 +45,30 @@ namespace dlsd {
     roots.push_back(b);
   }
   return roots;
+}
+
+/// Coefficients, lowest first, of the polynomial of degree N - 1 through `function` at the
+/// Chebyshev nodes of [0, end]: within a small factor of the best approximation there. For N up to
+/// about 12; beyond that, powers of x lose digits.
+template <size_t N, class Function>
+[[nodiscard]] std::array<double, N> interpolateAtChebyshevNodes(double end,
+                                                                const Function& function) {
+  std::array<double, N> x{}, difference{}, c{};
+  for (size_t i = 0; i < N; ++i) {
+    x[i] = end *
+           (0.5 + 0.5 * std::cos(M_PI * (static_cast<double>(i) + 0.5) / static_cast<double>(N)));
+    difference[i] = function(x[i]);
+  }
+  // Newton's divided differences, then his form multiplied out.
+  for (size_t order = 1; order < N; ++order) {
+    for (size_t i = N; i-- > order;) {
+      difference[i] = (difference[i] - difference[i - 1]) / (x[i] - x[i - order]);
+    }
+  }
+  for (size_t i = N; i-- > 0;) {
+    for (size_t k = N; k-- > 0;) c[k] = (k > 0 ? c[k - 1] : difference[i]) - x[i] * c[k];
+  }
+  return c;
 }
 
 }  // namespace dlsd

@@ -71,7 +71,7 @@ struct Radtan {
   template <class T>
   [[nodiscard]] PlanePoint<Wider<T>> undistort(T mx, T my, double radius) const {
     using W = Wider<T>;
-    const T px(p2), py(p1);
+    const T px = T(p2), py = T(p1);
     const auto h = [&](T r) -> ValueAndSlope<T> {
       const T t = r * r;
       const T ax = mx - px * t, ay = my - py * t;
@@ -86,7 +86,7 @@ struct Radtan {
       return {value, slope};
     };
     const bool valid = radius >= kUnbounded || h(T(radius)).value > T(0);
-    const T hi(radius);
+    const T hi = T(radius);
     const T length = std::sqrt(mx * mx + my * my);
     const T r = valid ? bracketedRoot(h, T(0), hi, length < hi / 2 ? length : hi / 2) : T(0);
     const W t = static_cast<W>(r) * r;

@@ -34,37 +34,40 @@ struct UnifiedOmni {
   bool operator==(const UnifiedOmni&) const = default;
 
   template <class T>
-  [[nodiscard]] Pixel<T> project(T x, T y, T z) const {
+  [[nodiscard, gnu::always_inline]] Pixel<T> project(T x, T y, T z) const {
     const T r2 = x * x + y * y;
     const T norm2 = r2 + z * z;
-    const T denom = denominator(r2, z, std::sqrt(norm2));
-    const T u = T(fx) * (x / denom) + T(cx);
-    const T v = T(fy) * (y / denom) + T(cy);
-    const bool before_fold = z >= T(0) || xi <= 1 || r2 > T((xi - 1) * (xi + 1)) * (z * z);
-    return {u, v, denom > T(0) && before_fold && norm2InRange(norm2) && pixelInRange(u, v)};
+    const auto [numerator, denominator] = inverseDepth(r2, z, std::sqrt(norm2));
+    const T scale = numerator / denominator;
+    const T u = T(fx) * (x * scale) + T(cx);
+    const T v = T(fy) * (y * scale) + T(cy);
+    const bool before_fold = anyOf(z >= T(0), xi <= 1, r2 > T((xi - 1) * (xi + 1)) * (z * z));
+    return {u, v, allOf(denominator > T(0), before_fold, norm2InRange(norm2), pixelInRange(u, v))};
   }
 
   template <class T>
-  [[nodiscard]] Ray<T> unproject(T u, T v) const {
-    const T mx = (u - T(cx)) / T(fx);
-    const T my = (v - T(cy)) / T(fy);
+  [[nodiscard, gnu::always_inline]] Ray<T> unproject(T u, T v) const {
+    const T mx = (u - T(cx)) * (T(1) / T(fx));
+    const T my = (v - T(cy)) * (T(1) / T(fy));
     const T m2 = mx * mx + my * my;
     const T disc = T(1) + T((1 - xi) * (1 + xi)) * m2;
-    const T root = std::sqrt(disc > T(0) ? disc : T(0));
-    const T scale = (T(xi) + root) / (T(1) + m2);
+    const T root = std::sqrt(std::max(disc, T(0)));
+    const T inverse = T(1) / (T(1) + m2);
+    const T scale = (T(xi) + root) * inverse;
     // z = scale - xi, written without the cancellation that large xi brings.
-    const T z = (root - T(xi) * m2) / (T(1) + m2);
-    return {mx * scale, my * scale, z, disc >= T(0) && pixelInRange(u, v)};
+    const T z = (root - T(xi) * m2) * inverse;
+    return {mx * scale, my * scale, z, allOf(disc >= T(0), pixelInRange(u, v))};
   }
 
   [[nodiscard]] ProjectionJacobian jacobian(double x, double y, double z) const {
     const double r2 = x * x + y * y;
     const double d = std::sqrt(r2 + z * z);
-    const double denom = denominator(r2, z, d);
+    const auto [numerator, denominator] = inverseDepth(r2, z, d);
+    const double s = numerator / denominator;
     // d + xi z vanishes at the fold; behind the camera without cancellation, as the denominator.
     const double slope = z >= 0 ? d + xi * z : (r2 - (xi - 1) * (xi + 1) * z * z) / (d - xi * z);
-    const double g = slope / (d * denom * denom);
-    return radialJacobian(fx, fy, x, y, 1 / denom, z * g, -std::sqrt(r2) * g);
+    const double g = slope / d * (s * s);
+    return radialJacobian(fx, fy, x, y, s, z * g, -std::sqrt(r2) * g);
   }
 
   [[nodiscard]] double maxFieldAngle() const {
@@ -73,11 +76,16 @@ struct UnifiedOmni {
   }
 
  private:
-  /// z + xi d.
   template <class T>
-  [[nodiscard]] T denominator(T r2, T z, T d) const {
-    return z >= T(0) ? z + T(xi) * d
-                     : (T(xi * xi) * r2 + T((xi - 1) * (xi + 1)) * (z * z)) / (T(xi) * d - z);
+  struct Quotient {
+    T numerator, denominator;
+  };
+  /// 1 / (z + xi d); the denominator has the sign of z + xi d.
+  template <class T>
+  [[nodiscard, gnu::always_inline]] Quotient<T> inverseDepth(T r2, T z, T d) const {
+    const bool front = z >= T(0);
+    const T behind = T(xi * xi) * r2 + T((xi - 1) * (xi + 1)) * (z * z);
+    return {select(front, T(1), T(xi) * d - z), select(front, z + T(xi) * d, behind)};
   }
 };
 static_assert(CameraModel<UnifiedOmni>);
