@@ -191,7 +191,7 @@ CameraMatrix cameraMatrix(const Field& field) {
     return m.values[i].number(allowedBy(specOf("pinhole", name)));
   };
   return {{value(0, "fx"), value(4, "fy"), value(2, "cx"), value(5, "cy")},
-          m.values[1].number({-1e6, 1e6, "px"})};
+          m.values[1].number({-1e7, 1e7, "px"})};
 }
 
 /// The numbers of a row or column. `counts`: how many there may be.
@@ -286,6 +286,11 @@ Loaded readStorage(const Document& document, Lens lens) {
                              fisheye = findOne(root, kFisheyeModel),
                              limit = findOne(root, kMaxFieldAngle);
   const double max_field_angle = limit ? limit->maxFieldAngle() : M_PI;
+  if (!D) {
+    root.fail(
+        "has no distortion coefficients: distortion_coefficients (or D) is missing, which is zeros "
+        "for a lens without distortion");
+  }
 
   Lens said = Lens::kUnknown;
   if (fisheye) {
@@ -304,7 +309,7 @@ Loaded readStorage(const Document& document, Lens lens) {
   if (lens == Lens::kUnknown) lens = said;
   if (lens == Lens::kUnknown) {
     // Without a word, the number of coefficients decides, unless it is that of both models.
-    if (D && vectorOf(*D, {0, 4, 5, 8, 12, 14}).size() == 4) {
+    if (vectorOf(*D, {0, 4, 5, 8, 12, 14}).size() == 4) {
       D->fail(
           "has 4 coefficients, which is cv::fisheye (k1, k2, k3, k4) or the pinhole model (k1, k2, "
           "p1, p2): "
@@ -317,7 +322,6 @@ Loaded readStorage(const Document& document, Lens lens) {
   const auto camera = [&]() -> Camera {
     if (lens == Lens::kFisheye) {
       refuseSkew(*K_field, K.skew);
-      if (!D) root.fail("has no distortion coefficients, 4 are needed");
       const std::array<double, 4> k = fisheyeCoefficients(vectorOf(*D, {4}));
       std::vector<double> params(K.fx_fy_cx_cy.begin(), K.fx_fy_cx_cy.end());
       params.insert(params.end(), k.begin(), k.end());
@@ -325,7 +329,6 @@ Loaded readStorage(const Document& document, Lens lens) {
     }
     if (lens == Lens::kOmnidir) {
       if (!xi) root.fail("has no xi, which cv::omnidir needs");
-      if (!D) root.fail("has no distortion coefficients, 4 are needed");
       std::vector<double> params{(xi->node().isScalar() ? *xi : vectorOf(*xi, {1}).front())
                                      .number(allowedBy(specOf("omni", "xi")))};
       params.insert(params.end(), K.fx_fy_cx_cy.begin(), K.fx_fy_cx_cy.end());

@@ -198,10 +198,11 @@ const TumModel& tumModelOf(const Document& document, const TextLine& line, size_
 
 // OCamCalib
 
+/// The numbers of a line, one for each name.
 std::vector<double> numbersOf(const Document& document,
                               const TextLine& line,
                               std::span<const std::string_view> names,
-                              const Allowed& allowed) {
+                              std::span<const Allowed> allowed) {
   if (line.words.size() != names.size()) {
     failLine(document,
              line,
@@ -209,17 +210,18 @@ std::vector<double> numbersOf(const Document& document,
   }
   std::vector<double> values;
   for (size_t i = 0; i < names.size(); ++i) {
-    values.push_back(line.word(document.source, i, names[i]).number(allowed));
+    values.push_back(line.word(document.source, i, names[i]).number(allowed[i]));
   }
   return values;
 }
 
-/// A line "n c0 c1 ... c(n-1)".
+/// A line "n c0 c1 ... c(n-1)"; allowed: of each coefficient, at most so many.
 std::vector<double> polynomialOf(const Document& document,
                                  const TextLine& line,
-                                 int max_count,
+                                 std::span<const Allowed> allowed,
                                  std::string_view name) {
-  const int count = line.word(document.source, 0, "number of coefficients").integer(1, max_count);
+  const int count = line.word(document.source, 0, "number of coefficients")
+                        .integer(1, static_cast<int>(allowed.size()));
   if (line.words.size() != static_cast<size_t>(count) + 1) {
     failLine(document,
              line,
@@ -227,9 +229,9 @@ std::vector<double> polynomialOf(const Document& document,
                  std::to_string(count));
   }
   std::vector<double> values;
-  for (size_t i = 1; i < line.words.size(); ++i) {
-    values.push_back(line.word(document.source, i, std::string(name) + std::to_string(i - 1))
-                         .number({-1e300, 1e300, ""}));
+  for (size_t i = 0; i + 1 < line.words.size(); ++i) {
+    values.push_back(line.word(document.source, i + 1, std::string(name) + std::to_string(i))
+                         .number(allowed[i]));
   }
   return values;
 }
@@ -346,7 +348,9 @@ Loaded readTum(const Document& document) {
     (void)output.word(document.source, 0, "mode").oneOf(kModes);
   } else {
     constexpr std::array<std::string_view, 5> kNames{"fx", "fy", "cx", "cy", "0"};
-    (void)numbersOf(document, output, kNames, {-1e9, 1e9, ""});
+    constexpr std::array<Allowed, 5> kAny{
+        {{-1e9, 1e9, ""}, {-1e9, 1e9, ""}, {-1e9, 1e9, ""}, {-1e9, 1e9, ""}, {0, 0, ""}}};
+    (void)numbersOf(document, output, kNames, kAny);
   }
   const TextLine& output_size = lineAt(document, 3, "width and height of the output");
   if (output_size.words.size() != 2)
@@ -403,7 +407,7 @@ Loaded readTum(const Document& document) {
 }
 
 bool isOcamcalib(const Document& document) {
-  if (document.lines.size() < 1) return false;
+  if (document.lines.empty()) return false;
   const std::vector<Node>& words = document.lines.front().words;
   return words.size() >= 2 && words.front().text == std::to_string(words.size() - 1) &&
          std::all_of(words.begin(), words.end(), isNumber);
@@ -412,24 +416,30 @@ bool isOcamcalib(const Document& document) {
 Loaded readOcamcalib(const Document& document) {
   constexpr std::array<std::string_view, 2> kCentre{"row of the centre", "column of the centre"};
   constexpr std::array<std::string_view, 3> kAffine{"c", "d", "e"};
-  constexpr int kCoefficients = 9;
-  constexpr int kMaxInverse = 100;
-  const Allowed any{-1e300, 1e300, ""};
+  constexpr size_t kCoefficients = 9;
+  constexpr size_t kMaxInverse = 100;
+  std::vector<Allowed> allowed;  // a0 ... a8, cx, cy, c, d, e
+  for (const ParamSpec& spec : paramSpecsOf("ocam")) allowed.push_back(allowedBy(spec));
+  const std::span<const Allowed> all = allowed;
+  const std::array<Allowed, 2> row_and_column{all[kCoefficients + 1], all[kCoefficients]};
   std::vector<double> params =
-      polynomialOf(document, lineAt(document, 0, "the polynomial"), kCoefficients, "a");
+      polynomialOf(document, lineAt(document, 0, "the polynomial"), all.first(kCoefficients), "a");
+  params.resize(kCoefficients, 0);
   // A fit to the first polynomial: nothing new is in it.
-  (void)polynomialOf(document, lineAt(document, 1, "the inverse polynomial"), kMaxInverse, "b");
-  const std::vector<double> centre =
-      numbersOf(document, lineAt(document, 2, "row and column of the centre"), kCentre, any);
-  const std::vector<double> affine =
-      numbersOf(document, lineAt(document, 3, "c, d and e"), kAffine, any);
+  const std::vector<Allowed> any(kMaxInverse, {-1e300, 1e300, ""});
+  (void)polynomialOf(document, lineAt(document, 1, "the inverse polynomial"), any, "b");
+  const std::vector<double> centre = numbersOf(
+      document, lineAt(document, 2, "row and column of the centre"), kCentre, row_and_column);
+  params.insert(params.end(), centre.rbegin(), centre.rend());
+  for (const double x :
+       numbersOf(document, lineAt(document, 3, "c, d and e"), kAffine, all.last(3))) {
+    params.push_back(x);
+  }
   const TextLine& size = lineAt(document, 4, "height and width");
   if (size.words.size() != 2) failLine(document, size, "must be height and width");
   const int height = size.word(document.source, 0, "height").imageSize();
   const int width = size.word(document.source, 1, "width").imageSize();
   expectEnd(document, 5);
-  params.resize(kCoefficients, 0);
-  params.insert(params.end(), {centre[1], centre[0], affine[0], affine[1], affine[2]});
   return {{{"cam0", document.field().camera("ocam", params, {width, height})}}};
 }
 
