@@ -14,6 +14,7 @@
 #include "cameras/calibration/files.h"
 #include "cli/command.h"
 #include "evaluation/dataset_evaluation.h"
+#include "evaluation/figures.h"
 #include "evaluation/summary.h"
 #include "synth/dataset/dataset.h"
 
@@ -94,11 +95,12 @@ int run(Arguments& arguments) {
     {
       Progress progress("frames (" + name + ")", dataset.size());
       evaluateFrames(dataset, source, options, arguments.jobs, [&](FrameEvaluation&& frame) {
-        summary.add(cameraName(frame.labels), frame.outcome);
+        summary.add(frame, dataset.camera(frame.labels));
         progress.done(size_t(summary.all.frames));
       });
     }
     text += fmt::format("{}== {} ==\n{}", text.empty() ? "" : "\n", name, table(summary));
+    text += table(makeFigures(summary), options);
     nlohmann::ordered_json result{{"detections", name}};
     result.update(toJson(summary));
     results.push_back(std::move(result));

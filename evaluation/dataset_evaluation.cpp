@@ -13,6 +13,7 @@
 #include <stdexcept>
 #include <system_error>
 #include <thread>
+#include <utility>
 
 #include "cameras/calibration/files.h"
 #include "detector/detector.h"
@@ -40,24 +41,68 @@ DetectionSource detectionsOfFile(const Dataset& dataset, const std::string& path
                                      labels.width,
                                      labels.height));
       }
-      return record.lines;
+      return Detections{record.lines, record.time_ms, std::nullopt};
     };
   };
 }
 
-DetectionSource detectionsOfDetector(const Dataset& dataset, const std::string& name) {
+DetectionSource detectionsOfDetector(const Dataset& dataset, const std::string& name, bool timed) {
   const DetectorOptions options = builtinOptions(name);
-  return [&dataset, options]() -> FrameDetections {
+  return [&dataset, options, timed]() -> FrameDetections {
     const auto detectors = std::make_shared<std::map<std::string, Detector>>();
-    return [&dataset, options, detectors](size_t, const LabelRecord& labels) {
+    return [&dataset, options, timed, detectors](size_t, const LabelRecord& labels) {
       auto it = detectors->find(labels.camera);
       if (it == detectors->end()) {
         it = detectors->emplace(labels.camera, Detector(dataset.camera(labels), options)).first;
       }
-      return detectLines(it->second, dataset.image(labels));
+      Detections detections{
+          detectLines(it->second, dataset.image(labels)), std::nullopt, std::nullopt};
+      if (timed) {
+        detections.time_ms = 1000 * it->second.times().total;
+      }
+      return detections;
     };
   };
 }
+
+namespace {
+
+/// Straight pieces of a Bezier curve: more than its deviation from them at any image size needs.
+constexpr int kBezierPieces = 240;
+
+/// Replaces the points of lines by points of the Bezier curves through them.
+void followBezier(std::vector<DetectionLine>& lines) {
+  for (size_t i = 0; i < lines.size(); ++i) {
+    const std::vector<Eigen::Vector2d> points = std::move(lines[i].points);
+    if (points.size() < 2 || points.size() > 8) {
+      throw std::invalid_argument(fmt::format(
+          "detection {} has {} points, a Bezier curve passes through 2 to 8", i, points.size()));
+    }
+    lines[i].points.clear();
+    for (int k = 0; k <= kBezierPieces; ++k) {
+      lines[i].points.push_back(interpolatingBezier(points, double(k) / kBezierPieces));
+    }
+  }
+}
+
+std::array<StructuralOutcome, kStructuralKinds> structureOf(
+    const LabelRecord& labels,
+    const std::vector<StructuralCurve>& curves,
+    const FrameOutcome& outcome) {
+  std::vector<StructuralCurve> label_curves;
+  std::vector<bool> clear;
+  for (size_t i = 0; i < labels.lines.size(); ++i) {
+    label_curves.push_back(structuralCurve(labels.lines[i].points, labels.width, labels.height));
+    clear.push_back(!outcome.conditions[i].faint && !outcome.conditions[i].is_short);
+  }
+  const std::vector<bool> all(clear.size(), true);
+  const auto match = [&](const std::vector<bool>& counts, bool chord) {
+    return matchStructure(label_curves, counts, curves, outcome.detection_score, chord);
+  };
+  return {match(all, false), match(clear, false), match(all, true), match(clear, true)};
+}
+
+}  // namespace
 
 std::string cameraName(const LabelRecord& labels) {
   return std::filesystem::path(labels.camera).stem().string();
@@ -87,8 +132,24 @@ void evaluateFrames(const Dataset& dataset,
     frame.labels = dataset.labels(i);
     try {
       frame.detections = detections(i, frame.labels);
-      frame.outcome = evaluateFrame(
-          dataset.camera(frame.labels), frame.labels.lines, frame.detections, options);
+      std::vector<DetectionLine>& lines = frame.detections.lines;
+      const std::vector<DetectionLine> given =
+          options.bezier ? lines : std::vector<DetectionLine>{};
+      if (options.bezier) {
+        followBezier(lines);
+      }
+      frame.outcome = evaluateFrame(dataset.camera(frame.labels),
+                                    frame.labels.lines,
+                                    lines,
+                                    options,
+                                    imageNoise(frame.labels));
+      std::vector<StructuralCurve> curves;
+      const int width = frame.labels.width, height = frame.labels.height;
+      for (size_t k = 0; k < lines.size(); ++k) {
+        curves.push_back(options.bezier ? structuralCurveOfBezier(given[k].points, width, height)
+                                        : structuralCurve(lines[k].points, width, height));
+      }
+      frame.structure = structureOf(frame.labels, curves, frame.outcome);
     } catch (const std::invalid_argument& error) {
       throw InputError(fmt::format("{}: {}", frame.labels.image, error.what()));
     }

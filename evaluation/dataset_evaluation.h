@@ -1,18 +1,27 @@
 #pragma once
 // Detections of a whole dataset against its labels.
 
+#include <array>
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "evaluation/evaluate.h"
-#include "evaluation/summary.h"
+#include "evaluation/structural_ap.h"
 #include "synth/dataset/dataset.h"
 
 namespace dlsd {
 
-/// The lines of frame i of a dataset.
-using FrameDetections = std::function<std::vector<DetectionLine>(size_t, const LabelRecord&)>;
+/// The lines of one frame, and how long they took if that was measured.
+struct Detections {
+  std::vector<DetectionLine> lines;
+  std::optional<double> time_ms;           ///< Of detection alone.
+  std::optional<double> rectification_ms;  ///< Of rectification, where the detector needs it.
+};
+
+/// The detections of frame i of a dataset.
+using FrameDetections = std::function<Detections(size_t, const LabelRecord&)>;
 
 /// Makes the above, one for each thread.
 using DetectionSource = std::function<FrameDetections()>;
@@ -24,13 +33,21 @@ using DetectionSource = std::function<FrameDetections()>;
 
 /// A built-in detector run on the images, each with its own camera. Throws InputError for an
 /// unknown name.
-[[nodiscard]] DetectionSource detectionsOfDetector(const Dataset& dataset, const std::string& name);
+/// @param timed  Measure times, which makes no two runs the same.
+[[nodiscard]] DetectionSource detectionsOfDetector(const Dataset& dataset,
+                                                   const std::string& name,
+                                                   bool timed = false);
+
+/// Which sAP: of curves or of chords, over all labels or over the clear ones (neither faint nor
+/// short).
+enum StructuralKind : size_t { kCurveAll, kCurveClear, kChordAll, kChordClear, kStructuralKinds };
 
 /// What a frame shows.
 struct FrameEvaluation {
   LabelRecord labels;
-  std::vector<DetectionLine> detections;
+  Detections detections;
   FrameOutcome outcome;
+  std::array<StructuralOutcome, kStructuralKinds> structure;  ///< [StructuralKind]
 };
 
 /// "wide" of "cameras/wide.yaml".

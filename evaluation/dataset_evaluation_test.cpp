@@ -8,7 +8,9 @@
 #include <thread>
 
 #include "evaluation/detections.h"
+#include "evaluation/figures.h"
 #include "evaluation/hand_made.h"
+#include "evaluation/summary.h"
 
 namespace dlsd {
 namespace {
@@ -127,12 +129,12 @@ TEST_F(DatasetEvaluation, EveryFrameOnceInOrderWhateverTheThreads) {
     size_t frames = 0;
     evaluateFrames(dataset, source, summary.options, jobs, [&](FrameEvaluation&& frame) {
       EXPECT_EQ(frame.labels.index, frames);
-      EXPECT_EQ(frame.detections.size(), 2U);
+      EXPECT_EQ(frame.detections.lines.size(), 2U);
       ++frames;
-      summary.add(cameraName(frame.labels), frame.outcome);
+      summary.add(frame, dataset.camera(frame.labels));
     });
     EXPECT_EQ(frames, labels.size());
-    texts.push_back(toJson(summary).dump());
+    texts.push_back(toJson(summary).dump() + toJson(makeFigures(summary)).dump());
   }
   for (const std::string& text : texts) {
     EXPECT_EQ(text, texts.front());
@@ -145,7 +147,7 @@ TEST_F(DatasetEvaluation, GoesOnWithFewerThreadsThanAskedFor) {
   writeDataset(data, exampleLabels(5));
   const Dataset dataset(data);
   const DetectionSource none = [] {
-    return [](size_t, const LabelRecord&) { return std::vector<DetectionLine>{}; };
+    return [](size_t, const LabelRecord&) { return Detections{}; };
   };
   // Stacks larger than the address space: no thread can be made.
   pthread_attr_t usual, huge;
@@ -174,8 +176,8 @@ TEST_F(DatasetEvaluation, BuiltInDetectorFindsAStep) {
           // The step lies between the rows 199 and 200; the second label has no edge in the image.
           EXPECT_TRUE(frame.outcome.labels[0][0].found);
           EXPECT_FALSE(frame.outcome.labels.back()[1].found);
-          ASSERT_FALSE(frame.detections.empty());
-          const DetectionLine& line = frame.detections[0];
+          ASSERT_FALSE(frame.detections.lines.empty());
+          const DetectionLine& line = frame.detections.lines[0];
           EXPECT_TRUE(line.normal && line.end_rays_in_cam && line.normal_cov && line.rms_px &&
                       line.max_px && line.angle_rad && line.score && line.polarity);
         });

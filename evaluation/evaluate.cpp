@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <limits>
@@ -9,6 +10,9 @@
 #include <span>
 #include <stdexcept>
 #include <tuple>
+#include <utility>
+
+#include "cameras/arc.h"
 
 namespace dlsd {
 namespace {
@@ -99,17 +103,54 @@ struct Piece {
   bool beyond_a, beyond_b;
 };
 
+/// Point of the straight piece from a to b that is nearest to p.
+struct Foot {
+  Vector2d point;
+  double t;  ///< Where p lies along the piece: in [0, 1] beside it.
+};
+
+Foot footOn(const Vector2d& a, const Vector2d& b, const Vector2d& p) {
+  const Vector2d ab = b - a;
+  const double norm2 = ab.squaredNorm();
+  const double t = norm2 > 0 ? (p - a).dot(ab) / norm2 : 0;
+  return {a + std::clamp(t, 0.0, 1.0) * ab, t};
+}
+
 struct PieceDistance {
   double d2_px2;
   bool beside;  ///< The nearest point is not an end of the curve with the point beyond it.
 };
 
 PieceDistance distanceTo(const Piece& piece, const Vector2d& p) {
-  const Vector2d ab = piece.b - piece.a;
-  const double norm2 = ab.squaredNorm();
-  const double t = norm2 > 0 ? (p - piece.a).dot(ab) / norm2 : 0;
-  const Vector2d foot = piece.a + std::clamp(t, 0.0, 1.0) * ab;
-  return {(p - foot).squaredNorm(), !((t < 0 && piece.beyond_a) || (t > 1 && piece.beyond_b))};
+  const Foot foot = footOn(piece.a, piece.b, p);
+  return {(p - foot.point).squaredNorm(),
+          !((foot.t < 0 && piece.beyond_a) || (foot.t > 1 && piece.beyond_b))};
+}
+
+/// Where a point lies along a curve.
+struct Place {
+  double length_px = 0;    ///< From the curve's start to the nearest point; not clamped.
+  double distance_px = 0;  ///< To the nearest point.
+  bool before = false, after = false;  ///< Beyond the start, the end.
+};
+
+Place placeAlong(const Curve& curve, const Vector2d& p) {
+  Place place;
+  double least_d2 = std::numeric_limits<double>::infinity();
+  for (size_t i = 1; i < curve.points.size(); ++i) {
+    const Foot foot = footOn(curve.points[i - 1], curve.points[i], p);
+    if (const double d2 = (p - foot.point).squaredNorm(); d2 < least_d2) {
+      least_d2 = d2;
+      const double piece = curve.length_to[i] - curve.length_to[i - 1];
+      place.before = i == 1 && foot.t < 0;
+      place.after = i + 1 == curve.points.size() && foot.t > 1;
+      place.length_px =
+          curve.length_to[i - 1] +
+          (place.before || place.after ? foot.t : std::clamp(foot.t, 0.0, 1.0)) * piece;
+    }
+  }
+  place.distance_px = std::sqrt(least_d2);
+  return place;
 }
 
 /// Axis-aligned box of pixels.
@@ -206,6 +247,23 @@ class PieceGrid {
   std::vector<Piece> entries_;
 };
 
+/// The point of one curve that is nearest to p, if the curve comes near.
+std::optional<Vector2d> nearestOn(const PieceGrid& grid, int curve, const Vector2d& p) {
+  double least_d2 = std::numeric_limits<double>::infinity();
+  std::optional<Vector2d> nearest;
+  for (const Piece& piece : grid.near(p)) {
+    if (piece.curve != curve) {
+      continue;
+    }
+    const Vector2d foot = footOn(piece.a, piece.b, p).point;
+    if (const double d2 = (p - foot).squaredNorm(); d2 < least_d2) {
+      least_d2 = d2;
+      nearest = foot;
+    }
+  }
+  return nearest;
+}
+
 /// Calls f(curve, least d2, least d2 of the pieces beside it) for every curve near a point.
 template <class F>
 void forCurvesNear(const PieceGrid& grid, const Vector2d& p, F&& f) {
@@ -231,6 +289,17 @@ struct Hit {
   int group;
   double d2_px2, beside_d2_px2;
 };
+
+/// Adds a hit to those of the same sample, of which a group has one: the nearest. Groups come
+/// together.
+void addHit(std::vector<Hit>& hits, const Hit& hit) {
+  if (!hits.empty() && hits.back().sample == hit.sample && hits.back().group == hit.group) {
+    hits.back().d2_px2 = std::min(hits.back().d2_px2, hit.d2_px2);
+    hits.back().beside_d2_px2 = std::min(hits.back().beside_d2_px2, hit.beside_d2_px2);
+  } else {
+    hits.push_back(hit);
+  }
+}
 
 /// Counters per group and rho that forget only what was touched.
 class Counters {
@@ -291,12 +360,66 @@ bool atLeastNineTenths(size_t counted, size_t total) {
 
 struct LabelSet {
   std::vector<Curve> curves;
-  std::vector<int> order;         ///< Labels sorted by carrier.
-  std::vector<int> carriers;      ///< Carrier ids, ascending.
-  std::vector<int> carrier_of;    ///< [label] index into carriers.
+  std::vector<int> order;       ///< Labels sorted by carrier, those of a run together.
+  std::vector<int> carriers;    ///< Carrier ids, ascending.
+  std::vector<int> carrier_of;  ///< [label] index into carriers.
+  std::vector<int> run_of;      ///< [label] number of its run; runs of a carrier are consecutive.
+  int runs = 0;
+  /// [label][end] Whether another label of its run goes on there; ends as the curve has them.
+  std::vector<std::array<bool, 2>> goes_on;
   std::vector<Vector3d> normals;  ///< [carrier index] of its line's plane.
   Bounds bounds;
 };
+
+/// Whether a point lies on a curve or at most kMaxBridgePx from it.
+bool bridgeable(const Curve& curve, const Vector2d& p) {
+  return placeAlong(curve, p).distance_px <= kMaxBridgePx;
+}
+
+/// Numbers the runs of `order`, which is sorted by carrier, and sorts it by run.
+void makeRuns(LabelSet& set) {
+  set.run_of.assign(set.curves.size(), -1);
+  set.goes_on.assign(set.curves.size(), {false, false});
+  for (auto first = set.order.begin(); first != set.order.end();) {
+    const auto end = std::find_if(first, set.order.end(), [&](int label) {
+      return set.carrier_of[size_t(label)] != set.carrier_of[size_t(*first)];
+    });
+    // Labels of one carrier lie on one curve, so they are near each other if an end is near the
+    // other label.
+    const auto joined = [&](int a, int b) {
+      const Curve& ca = set.curves[size_t(a)];
+      const Curve& cb = set.curves[size_t(b)];
+      const std::array<bool, 2> a_goes_on{bridgeable(cb, ca.points.front()),
+                                          bridgeable(cb, ca.points.back())};
+      for (size_t e = 0; e < 2; ++e) {
+        set.goes_on[size_t(a)][e] = set.goes_on[size_t(a)][e] || a_goes_on[e];
+      }
+      return a_goes_on[0] || a_goes_on[1] || bridgeable(ca, cb.points.front()) ||
+             bridgeable(ca, cb.points.back());
+    };
+    std::vector<int> members;
+    for (auto seed = first; seed != end; ++seed) {
+      if (set.run_of[size_t(*seed)] >= 0) {
+        continue;
+      }
+      members.assign(1, *seed);
+      set.run_of[size_t(*seed)] = set.runs;
+      for (size_t m = 0; m < members.size(); ++m) {
+        for (auto it = first; it != end; ++it) {
+          if (*it != members[m] && joined(members[m], *it) && set.run_of[size_t(*it)] < 0) {
+            set.run_of[size_t(*it)] = set.runs;
+            members.push_back(*it);
+          }
+        }
+      }
+      ++set.runs;
+    }
+    first = end;
+  }
+  std::stable_sort(set.order.begin(), set.order.end(), [&](int a, int b) {
+    return set.run_of[size_t(a)] < set.run_of[size_t(b)];
+  });
+}
 
 LabelSet makeLabelSet(const Camera& camera, const std::vector<LabelLine>& labels) {
   LabelSet set;
@@ -329,6 +452,7 @@ LabelSet makeLabelSet(const Camera& camera, const std::vector<LabelLine>& labels
   std::stable_sort(set.order.begin(), set.order.end(), [&](int a, int b) {
     return set.carrier_of[size_t(a)] < set.carrier_of[size_t(b)];
   });
+  makeRuns(set);
   return set;
 }
 
@@ -402,6 +526,56 @@ bool isMerged(const Camera& camera,
   return bridges && atLeastNineTenths(in_position, samples.points.size());
 }
 
+/// The plane of a detection: its own normal, else the one that fits the rays of its curve best.
+/// None if the rays are too few or too close to have a plane.
+std::optional<Vector3d> planeOf(const Camera& camera,
+                                const DetectionLine& line,
+                                const Curve& curve) {
+  if (line.normal) {
+    return line.normal;
+  }
+  Samples samples;
+  sampleBetween(curve, 0, curve.length(), samples);
+  Eigen::Matrix3d moments = Eigen::Matrix3d::Zero();
+  for (const Vector2d& p : samples.points) {
+    if (const std::optional<Vector3d> ray = camera.unproject(p)) {
+      moments += *ray * ray->transpose();
+    }
+  }
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(moments);
+  // Rays of two directions at least: 1e-10 is a spread of some 1e-5 rad.
+  if (!(eigen.eigenvalues()(1) > 1e-10 * eigen.eigenvalues()(2))) {
+    return std::nullopt;
+  }
+  return eigen.eigenvectors().col(0);
+}
+
+/// A label's end `label_at_end` of its curve against an end of the detection.
+EndError endError(const Curve& label,
+                  const Curve& detection,
+                  const Place& detection_end,
+                  bool label_at_end,
+                  bool detection_at_end) {
+  const bool beyond = label_at_end ? detection_end.after : detection_end.before;
+  if (!beyond) {
+    return {-(label_at_end ? label.length() - detection_end.length_px : detection_end.length_px),
+            detection_end.distance_px};
+  }
+  const Place place =
+      placeAlong(detection, label_at_end ? label.points.back() : label.points.front());
+  const double at = std::clamp(place.length_px, 0.0, detection.length());
+  return {detection_at_end ? detection.length() - at : at, place.distance_px};
+}
+
+/// Of both ends of a label, in the order of its curve.
+std::array<EndError, 2> endErrors(const Curve& label, const Curve& detection) {
+  const Place start = placeAlong(label, detection.points.front());
+  const Place end = placeAlong(label, detection.points.back());
+  const bool same_way = start.length_px <= end.length_px;
+  return {endError(label, detection, same_way ? start : end, false, !same_way),
+          endError(label, detection, same_way ? end : start, true, same_way)};
+}
+
 /// Angle between the rays of a curve's first and last points that have one; 0 if none has.
 double endAngle(const Camera& camera, const std::vector<Vector2d>& points) {
   const auto firstRay = [&](auto begin, auto end) -> std::optional<Vector3d> {
@@ -450,6 +624,13 @@ void EvaluationOptions::check() const {
   if (!(crowded_px >= 0 && crowded_px <= 100)) {
     refuse("crowded_px", crowded_px, "[0, 100]");
   }
+}
+
+Stratum stratumOf(const LabelConditions& conditions) {
+  return conditions.faint      ? Stratum::kFaint
+         : conditions.is_short ? Stratum::kShort
+         : conditions.crowded  ? Stratum::kCrowded
+                               : Stratum::kHeadline;
 }
 
 std::string_view toString(Stratum stratum) {
@@ -504,7 +685,8 @@ double DistanceStats::quantile(double q) const {
 FrameOutcome evaluateFrame(const Camera& camera,
                            const std::vector<LabelLine>& labels,
                            const std::vector<DetectionLine>& detections,
-                           const EvaluationOptions& options) {
+                           const EvaluationOptions& options,
+                           const std::optional<ImageNoise>& noise) {
   options.check();
   const size_t rhos = options.rho_px.size();
   std::vector<double> rho2;
@@ -540,52 +722,110 @@ FrameOutcome evaluateFrame(const Camera& camera,
   // Strata.
   for (size_t i = 0; i < labels.size(); ++i) {
     const LabelLine& label = labels[i];
-    if (!(label.contrast >= options.headline_contrast)) {
-      outcome.strata.push_back(Stratum::kFaint);
-    } else if (!(label.angle_rad >= options.headline_angle_rad &&
-                 label.length_px >= options.headline_length_px)) {
-      outcome.strata.push_back(Stratum::kShort);
-    } else if (isCrowded(set, label_grid, i, options.crowded_px, samples)) {
-      outcome.strata.push_back(Stratum::kCrowded);
-    } else {
-      outcome.strata.push_back(Stratum::kHeadline);
+    outcome.conditions.push_back(
+        {.faint = !(label.contrast >= options.headline_contrast),
+         .is_short = !(label.angle_rad >= options.headline_angle_rad &&
+                       label.length_px >= options.headline_length_px),
+         .crowded = isCrowded(set, label_grid, i, options.crowded_px, samples)});
+    outcome.strata.push_back(stratumOf(outcome.conditions.back()));
+  }
+  outcome.run_of = set.run_of;
+  outcome.run_strata.resize(size_t(set.runs));
+  std::vector<double> run_length_px(size_t(set.runs), 0.0);
+  for (size_t i = 0; i < labels.size(); ++i) {
+    const auto run = size_t(set.run_of[i]);
+    const std::pair mine(set.curves[i].length(), -int(outcome.strata[i]));
+    if (mine > std::pair(run_length_px[run], -int(outcome.run_strata[run]))) {
+      run_length_px[run] = mine.first;
+      outcome.run_strata[run] = outcome.strata[i];
     }
   }
+  outcome.runs.assign(rhos, std::vector<RunOutcome>(size_t(set.runs)));
 
   // Labels: found, and how far from the detection that found them.
   std::array<std::vector<DistanceStats>, kStratumCount> distances;
   Counters near_detection(detections.size(), rhos);
+  std::vector<double>& scores = outcome.detection_score;
+  for (size_t i = 0; i < detections.size(); ++i) {
+    outcome.detection_length_px.push_back(curves[i].length());
+    scores.push_back(detections[i].score.value_or(curves[i].length()));
+  }
+  // [rho] (detection, run) where the detection finds a label of the run.
+  std::vector<std::vector<std::pair<int, int>>> finders(rhos);
+  outcome.errors.resize(labels.size());
   for (size_t i = 0; i < labels.size(); ++i) {
     const double length = set.curves[i].length();
     const double trim = std::min(kLabelTrimPx, length / 4);
     sampleBetween(set.curves[i], trim, length - trim, samples);
-    hits.clear();
-    for (size_t k = 0; k < samples.points.size(); ++k) {
-      forCurvesNear(
-          detection_grid, samples.points[k], [&](int detection, double d2, double beside) {
-            near_detection.add(detection, d2, rho2);
-            hits.push_back({k, detection, d2, beside});
-          });
+    for (const Vector2d& p : samples.points) {
+      forCurvesNear(detection_grid, p, [&](int detection, double d2, double) {
+        near_detection.add(detection, d2, rho2);
+      });
     }
     for (size_t r = 0; r < rhos; ++r) {
       LabelOutcome& result = outcome.labels[r][i];
       result.detection = near_detection.best(r);
-      if (result.detection >= 0) {
-        const size_t covered = near_detection.count(result.detection, r);
-        result.coverage = double(covered) / double(samples.points.size());
-        result.found = atLeastNineTenths(covered, samples.points.size());
+      if (result.detection < 0) {
+        continue;
       }
-    }
-    if (const LabelOutcome& result = outcome.labels.back()[i]; result.found) {
-      DistanceStats stats;
-      for (const Hit& hit : hits) {
-        if (hit.group == result.detection && hit.d2_px2 <= rho2.back()) {
-          stats.add(std::sqrt(hit.d2_px2));
+      const size_t covered = near_detection.count(result.detection, r);
+      result.coverage = double(covered) / double(samples.points.size());
+      result.found = atLeastNineTenths(covered, samples.points.size());
+      if (!result.found) {
+        continue;
+      }
+      result.found_score = scores[size_t(result.detection)];
+      for (const int detection : near_detection.touched()) {
+        if (atLeastNineTenths(near_detection.count(detection, r), samples.points.size())) {
+          result.found_score = std::max(result.found_score, scores[size_t(detection)]);
+          finders[r].emplace_back(detection, set.run_of[i]);
         }
       }
-      distances[size_t(outcome.strata[i])].push_back(std::move(stats));
+      outcome.runs[r][size_t(set.run_of[i])].found = true;
     }
     near_detection.clear();
+    const LabelOutcome& result = outcome.labels.back()[i];
+    if (!result.found) {
+      continue;
+    }
+    DistanceStats stats;
+    LabelErrors& errors = outcome.errors[i].emplace();
+    for (const Vector2d& p : samples.points) {
+      const std::optional<Vector2d> foot = nearestOn(detection_grid, result.detection, p);
+      if (!foot || !((p - *foot).squaredNorm() <= rho2.back())) {
+        continue;
+      }
+      stats.add((p - *foot).norm());
+      if (const std::optional<Vector3d> ray = camera.unproject(*foot)) {
+        const double angle = std::asin(std::min(1.0, std::abs(labels[i].normal.dot(*ray))));
+        ++errors.angle_samples;
+        errors.sum_rad += angle;
+        errors.sum2_rad2 += angle * angle;
+      }
+    }
+    errors.samples = stats.count;
+    errors.sum_px = stats.sum_px;
+    errors.sum2_px2 = stats.sum2_px2;
+    distances[size_t(outcome.strata[i])].push_back(std::move(stats));
+
+    const Curve& detection = curves[size_t(result.detection)];
+    const std::array<EndError, 2> ends = endErrors(set.curves[i], detection);
+    const bool turned = set.curves[i].points.front() != labels[i].points.front();
+    for (size_t e = 0; e < 2; ++e) {
+      if (!set.goes_on[i][e]) {
+        errors.ends[turned ? 1 - e : e] = ends[e];
+      }
+    }
+    const std::optional<Vector3d> normal =
+        planeOf(camera, detections[size_t(result.detection)], detection);
+    if (normal) {
+      errors.normal_rad = angleBetweenPlanes(labels[i].normal, *normal);
+    }
+    if (normal && noise && outcome.strata[i] == Stratum::kHeadline) {
+      if (const auto information = normalInformation(camera, labels[i], *noise)) {
+        errors.normal_sigmas = normalErrorInSigmas(*information, labels[i].normal, *normal);
+      }
+    }
   }
   for (size_t s = 0; s < kStratumCount; ++s) {
     // Sums of floating-point numbers depend on their order: take one that labels can't change.
@@ -597,27 +837,26 @@ FrameOutcome evaluateFrame(const Camera& camera,
     }
   }
 
-  // Detections: right, merged, fragments of the labels they lie on.
+  // Detections: right, merged, fragments of the runs they lie on.
   Counters near_carrier(set.carriers.size(), rhos);
-  Counters near_label(labels.size(), rhos);
+  Counters near_run(size_t(set.runs), rhos);
   std::vector<Evidence> evidence;
+  std::vector<Hit> run_hits;
   for (size_t i = 0; i < detections.size(); ++i) {
     sampleBetween(curves[i], 0, curves[i].length(), samples);
     hits.clear();
+    run_hits.clear();
     for (size_t k = 0; k < samples.points.size(); ++k) {
       forCurvesNear(label_grid, samples.points[k], [&](int label, double d2, double beside_d2) {
-        near_label.add(label, d2, rho2);
-        const int carrier = set.carrier_of[size_t(label)];
-        if (!hits.empty() && hits.back().sample == k && hits.back().group == carrier) {
-          hits.back().d2_px2 = std::min(hits.back().d2_px2, d2);
-          hits.back().beside_d2_px2 = std::min(hits.back().beside_d2_px2, beside_d2);
-        } else {
-          hits.push_back({k, carrier, d2, beside_d2});
-        }
+        addHit(hits, {k, set.carrier_of[size_t(label)], d2, beside_d2});
+        addHit(run_hits, {k, set.run_of[size_t(label)], d2, beside_d2});
       });
     }
     for (const Hit& hit : hits) {
       near_carrier.add(hit.group, hit.d2_px2, rho2);
+    }
+    for (const Hit& hit : run_hits) {
+      near_run.add(hit.group, hit.d2_px2, rho2);
     }
     const size_t total = samples.points.size();
     for (size_t r = 0; r < rhos; ++r) {
@@ -637,17 +876,68 @@ FrameOutcome evaluateFrame(const Camera& camera,
         result.merged =
             isMerged(camera, set.normals[size_t(carrier)], samples, evidence, options.rho_px[r]);
       }
-      for (const int label : near_label.touched()) {
-        if (2 * near_label.count(label, r) >= total) {
-          ++outcome.labels[r][size_t(label)].fragments;
+      for (const int run : near_run.touched()) {
+        if (2 * near_run.count(run, r) >= total) {
+          finders[r].emplace_back(int(i), run);
         }
       }
     }
     near_carrier.clear();
-    near_label.clear();
+    near_run.clear();
     outcome.detection_angle_rad.push_back(endAngle(camera, detections[i].points));
+    const std::optional<Vector3d> middle = camera.unproject(samples.points[total / 2]);
+    outcome.detection_field_angle_rad.push_back(
+        middle ? std::optional(std::atan2(middle->head<2>().norm(), middle->z())) : std::nullopt);
+  }
+  for (size_t r = 0; r < rhos; ++r) {
+    std::sort(finders[r].begin(), finders[r].end());
+    const auto end = std::unique(finders[r].begin(), finders[r].end());
+    for (auto it = finders[r].begin(); it != end; ++it) {
+      ++outcome.runs[r][size_t(it->second)].fragments;
+    }
   }
   return outcome;
+}
+
+std::vector<bool> coveredByOne(const Camera& camera,
+                               const std::vector<DetectionLine>& lines,
+                               const std::vector<DetectionLine>& detections,
+                               double rho_px,
+                               double share) {
+  std::vector<Curve> curves;
+  std::vector<int> order;
+  Bounds bounds;
+  for (size_t i = 0; i < lines.size(); ++i) {
+    for (const Vector2d& p : lines[i].points) {
+      bounds.min = bounds.min.cwiseMin(p);
+      bounds.max = bounds.max.cwiseMax(p);
+    }
+  }
+  bounds.min.array() -= 1;
+  bounds.max.array() += 1;
+  for (size_t i = 0; i < detections.size(); ++i) {
+    curves.push_back(makeCurve(camera, detections[i].points, "detection", i));
+    order.push_back(int(i));
+  }
+  const PieceGrid grid(curves, order, bounds, rho_px);
+  const std::array rho2{rho_px * rho_px};
+  Counters near_detection(detections.size(), 1);
+  Samples samples;
+  std::vector<bool> covered;
+  for (size_t i = 0; i < lines.size(); ++i) {
+    const Curve line = makeCurve(camera, lines[i].points, "line", i);
+    sampleBetween(line, 0, line.length(), samples);
+    for (const Vector2d& p : samples.points) {
+      forCurvesNear(grid, p, [&](int detection, double d2, double) {
+        near_detection.add(detection, d2, rho2);
+      });
+    }
+    const int best = near_detection.best(0);
+    covered.push_back(best >= 0 && double(near_detection.count(best, 0)) >=
+                                       share * double(samples.points.size()));
+    near_detection.clear();
+  }
+  return covered;
 }
 
 }  // namespace dlsd

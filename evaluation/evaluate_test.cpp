@@ -45,6 +45,15 @@ std::vector<bool> mergedAt(const FrameOutcome& outcome, size_t detection_index) 
   return merged;
 }
 
+/// Fragments of the run of a label, by rho.
+std::vector<int> fragmentsOf(const FrameOutcome& outcome, size_t label_index) {
+  std::vector<int> fragments;
+  for (const auto& at_rho : outcome.runs) {
+    fragments.push_back(at_rho.at(size_t(outcome.run_of.at(label_index))).fragments);
+  }
+  return fragments;
+}
+
 const std::vector<bool> kAlways{true, true, true};
 const std::vector<bool> kNever{false, false, false};
 
@@ -68,8 +77,8 @@ TEST_F(Evaluate, PerfectDetectionFindsItsLabelAndIsRight) {
   for (const auto& at_rho : outcome.labels) {
     EXPECT_EQ(at_rho[0].detection, 0);
     EXPECT_EQ(at_rho[0].coverage, 1);
-    EXPECT_EQ(at_rho[0].fragments, 1);
   }
+  EXPECT_EQ(fragmentsOf(outcome, 0), (std::vector<int>{1, 1, 1}));
   for (const auto& at_rho : outcome.detections) {
     EXPECT_EQ(at_rho[0].coverage, 1);
     EXPECT_EQ(at_rho[0].carrier, 0);
@@ -129,8 +138,8 @@ TEST_F(Evaluate, TwoHalvesAreRightButDoNotFindTheLabel) {
   EXPECT_EQ(foundAt(outcome, 0), kNever);
   EXPECT_EQ(rightAt(outcome, 0), kAlways);
   EXPECT_EQ(rightAt(outcome, 1), kAlways);
+  EXPECT_EQ(fragmentsOf(outcome, 0), (std::vector<int>{2, 2, 2}));
   for (const auto& at_rho : outcome.labels) {
-    EXPECT_EQ(at_rho[0].fragments, 2);
     EXPECT_NEAR(at_rho[0].coverage, 0.5, 0.03);
   }
 }
@@ -141,8 +150,8 @@ TEST_F(Evaluate, DuplicatesAreAllRightAndCountAsFragments) {
   for (const auto& at_rho : outcome.labels) {
     EXPECT_TRUE(at_rho[0].found);
     EXPECT_EQ(at_rho[0].detection, 0);
-    EXPECT_EQ(at_rho[0].fragments, 3);
   }
+  EXPECT_EQ(fragmentsOf(outcome, 0), (std::vector<int>{3, 3, 3}));
   for (size_t i = 0; i < 3; ++i) {
     EXPECT_EQ(rightAt(outcome, i), kAlways);
   }
@@ -152,13 +161,9 @@ TEST_F(Evaluate, DetectionHalfBesideItsLabelIsWrongButStillAFragment) {
   // 200 px, the first 110 on the label.
   const FrameOutcome outcome = run({line}, {detection({{190, 200}, {390, 200}})});
   EXPECT_EQ(rightAt(outcome, 0), kNever);
-  for (const auto& at_rho : outcome.labels) {
-    EXPECT_EQ(at_rho[0].fragments, 1);
-  }
+  EXPECT_EQ(fragmentsOf(outcome, 0), (std::vector<int>{1, 1, 1}));
   const FrameOutcome less = run({line}, {detection({{210, 200}, {410, 200}})});
-  for (const auto& at_rho : less.labels) {
-    EXPECT_EQ(at_rho[0].fragments, 0);
-  }
+  EXPECT_EQ(fragmentsOf(less, 0), (std::vector<int>{0, 0, 0}));
 }
 
 TEST_F(Evaluate, DetectionOverTwoSpansOfOneCarrierIsRight) {
@@ -168,6 +173,152 @@ TEST_F(Evaluate, DetectionOverTwoSpansOfOneCarrierIsRight) {
   EXPECT_EQ(mergedAt(outcome, 0), kNever);  // bridges 4 px
   EXPECT_EQ(foundAt(outcome, 0), kAlways);
   EXPECT_EQ(foundAt(outcome, 1), kAlways);
+}
+
+TEST_F(Evaluate, LabelsOfACarrierThatFollowEachOtherAreOneRun) {
+  // Three labels of one carrier, gaps of 4 and 20 px; one of another carrier in line with them.
+  const LabelLine next = label(camera, {304, 200}, {400, 200}, 0);
+  const LabelLine far = label(camera, {420, 200}, {500, 200}, 0);
+  const LabelLine stranger = label(camera, {502, 200}, {600, 200}, 1);
+  const std::vector<LabelLine> labels{far, line, stranger, next};
+  const FrameOutcome one_each =
+      run(labels, {detection({{100, 200}, {400, 200}}), detection({{420, 200}, {500, 200}})});
+  EXPECT_EQ(one_each.run_of[1], one_each.run_of[3]);
+  EXPECT_NE(one_each.run_of[1], one_each.run_of[0]);
+  EXPECT_NE(one_each.run_of[2], one_each.run_of[0]);
+  EXPECT_EQ(one_each.runs[0].size(), 3U);
+  EXPECT_EQ(fragmentsOf(one_each, 1), (std::vector<int>{1, 1, 1}));
+  EXPECT_EQ(fragmentsOf(one_each, 0), (std::vector<int>{1, 1, 1}));
+  EXPECT_EQ(fragmentsOf(one_each, 2), (std::vector<int>{0, 0, 0}));
+  // A detection over all of a carrier is a fragment of each run that it finds, however small its
+  // part.
+  const FrameOutcome merged = run(labels, {detection({{100, 200}, {500, 200}})});
+  EXPECT_EQ(fragmentsOf(merged, 1), (std::vector<int>{1, 1, 1}));
+  EXPECT_EQ(fragmentsOf(merged, 0), (std::vector<int>{1, 1, 1}));
+  // Two detections where the labels meet are two fragments of one run.
+  const FrameOutcome split =
+      run(labels, {detection({{100, 200}, {300, 200}}), detection({{304, 200}, {400, 200}})});
+  EXPECT_EQ(fragmentsOf(split, 1), (std::vector<int>{2, 2, 2}));
+  // The run's stratum is that of its longest label.
+  EXPECT_EQ(split.run_strata[size_t(split.run_of[3])], split.strata[1]);
+}
+
+TEST_F(Evaluate, EndErrorsAlongAndAcross) {
+  struct Case {
+    DetectionLine detection;
+    EndError start, end;
+  };
+  // y = 200, from x = 100 to 300.
+  for (const Case& c : {Case{detection({{100, 200}, {300, 200}}), {0, 0}, {0, 0}},
+                        Case{detection({{103, 200.5}, {298, 200.5}}), {-3, 0.5}, {-2, 0.5}},
+                        Case{detection({{95, 200}, {310, 200}}), {5, 0}, {10, 0}},
+                        Case{detection({{95, 201}, {200, 199}, {298, 201}}), {5, 0.9}, {-2, 1}}}) {
+    for (const DetectionLine& d : {c.detection, reversed(c.detection)}) {
+      const FrameOutcome outcome = run({line}, {d});
+      ASSERT_TRUE(outcome.errors.at(0));
+      const auto& ends = outcome.errors[0]->ends;
+      ASSERT_TRUE(ends[0] && ends[1]);
+      EXPECT_NEAR(ends[0]->along_px, c.start.along_px, 0.11);
+      EXPECT_NEAR(ends[0]->across_px, c.start.across_px, 0.01);
+      EXPECT_NEAR(ends[1]->along_px, c.end.along_px, 0.11);
+      EXPECT_NEAR(ends[1]->across_px, c.end.across_px, 0.01);
+    }
+  }
+  // The label's own direction decides which end is which.
+  LabelLine other = line;
+  std::reverse(other.points.begin(), other.points.end());
+  const FrameOutcome turned = run({other}, {detection({{103, 200}, {298, 200}})});
+  EXPECT_NEAR(turned.errors.at(0)->ends[0]->along_px, -2, 1e-9);
+  EXPECT_NEAR(turned.errors.at(0)->ends[1]->along_px, -3, 1e-9);
+  // No error where the run goes on, none at all if the label is not found.
+  const LabelLine next = label(camera, {304, 200}, {400, 200}, 0);
+  const FrameOutcome run_on = run({line, next}, {detection({{103, 200}, {402, 200}})});
+  EXPECT_NEAR(run_on.errors.at(0)->ends[0]->along_px, -3, 1e-9);
+  EXPECT_FALSE(run_on.errors.at(0)->ends[1]);
+  EXPECT_FALSE(run_on.errors.at(1)->ends[0]);
+  EXPECT_NEAR(run_on.errors.at(1)->ends[1]->along_px, 2, 1e-9);
+  EXPECT_FALSE(run({line}, {detection({{100, 200}, {200, 200}})}).errors.at(0));
+}
+
+TEST_F(Evaluate, EndErrorsFollowTheCurve) {
+  // On a strongly curved label, 12 px of the detection are missing and 20 px too many: what is
+  // measured is the length along the curve.
+  const Camera fisheye{Fov::fromParams({220, 220, 320, 240, 0.93}), 640, 480};
+  const Arc arc = arcBetween(*fisheye.unproject({60, 60}), *fisheye.unproject({580, 60})).value();
+  const LabelLine whole = label(fisheye, {60, 60}, {580, 60}, 0);
+  const auto lengthOf = [&](double t0, double t1) {
+    double length = 0;
+    const auto points = imageCurve(fisheye, arc, t0, t1, 1e-4);
+    for (size_t i = 1; i < points.size(); ++i) {
+      length += (points[i] - points[i - 1]).norm();
+    }
+    return length;
+  };
+  LabelLine inner = whole;
+  inner.points = imageCurve(fisheye, arc, 0.03, 0.94);
+  const FrameOutcome outcome =
+      evaluateFrame(fisheye, {inner}, {detection(imageCurve(fisheye, arc, 0, 0.92))}, kOptions);
+  ASSERT_TRUE(outcome.errors.at(0));
+  EXPECT_NEAR(outcome.errors[0]->ends[0]->along_px, lengthOf(0, 0.03), 0.05);
+  EXPECT_NEAR(outcome.errors[0]->ends[1]->along_px, -lengthOf(0.92, 0.94), 0.05);
+  EXPECT_LE(outcome.errors[0]->ends[0]->across_px, 0.02);
+  EXPECT_LE(outcome.errors[0]->ends[1]->across_px, 0.02);
+}
+
+TEST_F(Evaluate, AnglesAndNormalsOfAKnownShift) {
+  // A line through the image's middle, moved up by half a pixel: the plane turns by atan(0.5 / f).
+  const LabelLine middle = label(camera, {100, 240}, {540, 240}, 0);
+  const FrameOutcome outcome = run({middle}, {shifted(middle, {0, 0.5})});
+  ASSERT_TRUE(outcome.errors.at(0));
+  const LabelErrors& errors = *outcome.errors[0];
+  EXPECT_EQ(errors.angle_samples, errors.samples);
+  ASSERT_TRUE(errors.normal_rad);
+  EXPECT_NEAR(*errors.normal_rad, std::atan(0.5 / 400), 1e-9);
+  // Towards the sides the ray is longer: 0.5 / f cos(field angle) on the average.
+  EXPECT_LE(errors.sum_rad / double(errors.angle_samples), 0.5 / 400);
+  EXPECT_GE(errors.sum_rad / double(errors.angle_samples), 0.9 * 0.5 / 400);
+  EXPECT_GE(errors.sum2_rad2 * double(errors.angle_samples), errors.sum_rad * errors.sum_rad);
+  EXPECT_FALSE(errors.normal_sigmas);  // nothing is known of the noise
+  // A detection's own normal is taken at its word, whatever its sign.
+  DetectionLine with_normal = shifted(middle, {0, 0.5});
+  with_normal.normal = -middle.normal;
+  EXPECT_LE(*run({middle}, {with_normal}).errors.at(0)->normal_rad, 1e-9);
+}
+
+TEST_F(Evaluate, FoundScoreIsTheBestOfTheFinders) {
+  DetectionLine low = shifted(line, {0, 0}), high = shifted(line, {0, 1.5});
+  low.score = 3;
+  high.score = 8;
+  const FrameOutcome outcome = run({line}, {low, high});
+  EXPECT_EQ(outcome.labels[0][0].found_score, 3);  // at 1 px only the first finds it
+  EXPECT_EQ(outcome.labels[1][0].found_score, 8);
+  EXPECT_EQ(outcome.labels[1][0].detection, 0);
+  // Without a score: its length.
+  EXPECT_NEAR(run({line}, {shifted(line, {0, 0})}).detection_score.at(0), 200, 1e-9);
+}
+
+TEST_F(Evaluate, CoveredByOneAsksForTheShareOfTheWholeLine) {
+  const std::vector<DetectionLine> lines{detection({{100, 200}, {300, 200}}),
+                                         detection({{100, 300}, {300, 300}})};
+  const auto covered = [&](double from, double to, double y) {
+    return coveredByOne(camera, lines, {detection({{from, y}, {to, y}})}, 4, 0.9);
+  };
+  using Covered = std::vector<bool>;
+  EXPECT_EQ(covered(100, 300, 200), (Covered{true, false}));
+  EXPECT_EQ(covered(100, 300, 203.9), (Covered{true, false}));
+  EXPECT_EQ(covered(100, 300, 204.1), (Covered{false, false}));
+  EXPECT_EQ(covered(0, 300, 300), (Covered{false, true}));
+  EXPECT_EQ(covered(100, 277, 200), (Covered{true, false}));   // 181 of 200 px with the 4 px beyond
+  EXPECT_EQ(covered(100, 274, 200), (Covered{false, false}));  // 178 of 200 px
+  // Two halves are not one.
+  EXPECT_EQ(coveredByOne(camera,
+                         lines,
+                         {detection({{100, 200}, {200, 200}}), detection({{200, 200}, {300, 200}})},
+                         4,
+                         0.9),
+            (Covered{false, false}));
+  EXPECT_EQ(coveredByOne(camera, {}, lines, 4, 0.9), Covered{});
+  EXPECT_EQ(coveredByOne(camera, lines, {}, 4, 0.9), (Covered{false, false}));
 }
 
 TEST_F(Evaluate, TwoCarriersInOneLineAreNotOne) {
@@ -216,8 +367,8 @@ TEST_F(Evaluate, EmptyOnEitherSide) {
   for (const auto& at_rho : no_detections.labels) {
     EXPECT_EQ(at_rho[0].detection, -1);
     EXPECT_EQ(at_rho[0].coverage, 0);
-    EXPECT_EQ(at_rho[0].fragments, 0);
   }
+  EXPECT_EQ(fragmentsOf(no_detections, 0), (std::vector<int>{0, 0, 0}));
   const FrameOutcome no_labels = run({}, {shifted(line, {0, 0})});
   EXPECT_EQ(rightAt(no_labels, 0), kNever);
   EXPECT_EQ(no_labels.detections[0][0].carrier, -1);
@@ -370,10 +521,17 @@ LabelLine genLabel(const Camera& camera, int carrier) {
 
 /// What is the same for a label or detection in whatever order they come.
 auto essence(const LabelOutcome& o) {
-  return std::tuple(o.found, o.coverage, o.fragments);
+  return std::tuple(o.found, o.coverage, o.found_score);
 }
 auto essence(const DetectionOutcome& o) {
   return std::tuple(o.right, o.merged, o.coverage, o.carrier);
+}
+
+/// Of the run of a label.
+auto essence(const FrameOutcome& outcome, size_t rho, size_t label_index) {
+  const auto run = size_t(outcome.run_of[label_index]);
+  return std::tuple(
+      outcome.runs[rho][run].found, outcome.runs[rho][run].fragments, outcome.run_strata[run]);
 }
 
 struct RandomFrame {
@@ -445,6 +603,7 @@ RC_GTEST_PROP(EvaluateProperty, OrderAndDirectionDoNotMatter, ()) {
   for (size_t r = 0; r < kOptions.rho_px.size(); ++r) {
     for (size_t i = 0; i < labels.size(); ++i) {
       RC_ASSERT(essence(b.labels[r][i]) == essence(a.labels[r][labels[i]]));
+      RC_ASSERT(essence(b, r, i) == essence(a, r, labels[i]));
     }
     for (size_t i = 0; i < detections.size(); ++i) {
       RC_ASSERT(essence(b.detections[r][i]) == essence(a.detections[r][detections[i]]));

@@ -153,7 +153,7 @@ ordered_json frameJson(size_t index, const FrameEvaluation& frame) {
          {"points", svgPoints(line.points)}});
   }
   ordered_json detections = ordered_json::array();
-  for (size_t i = 0; i < frame.detections.size(); ++i) {
+  for (size_t i = 0; i < frame.detections.lines.size(); ++i) {
     unsigned right = 0, merged = 0;
     ordered_json coverage = ordered_json::array();
     for (size_t r = 0; r < outcome.detections.size(); ++r) {
@@ -166,9 +166,9 @@ ordered_json frameJson(size_t index, const FrameEvaluation& frame) {
                    {"right", right},
                    {"merged", merged},
                    {"coverage", std::move(coverage)},
-                   {"points", svgPoints(frame.detections[i].points)}};
-    if (frame.detections[i].score) {
-      j["score"] = fmt::format("{:.1f}", *frame.detections[i].score);
+                   {"points", svgPoints(frame.detections.lines[i].points)}};
+    if (frame.detections.lines[i].score) {
+      j["score"] = fmt::format("{:.1f}", *frame.detections.lines[i].score);
     }
     detections.push_back(std::move(j));
   }
@@ -376,7 +376,7 @@ Report writeReport(const Dataset& dataset,
   std::vector<FramePage> frames;
   std::vector<LabelRecord> records;
   const DetectionSource none = [] {
-    return [](size_t, const LabelRecord&) { return std::vector<DetectionLine>{}; };
+    return [](size_t, const LabelRecord&) { return Detections{}; };
   };
   evaluateFrames(dataset,
                  detections.value_or(none),
@@ -395,7 +395,7 @@ Report writeReport(const Dataset& dataset,
                    page.script =
                        "dlsdFrame(" + scriptJson(frameJson(frames.size(), frame)) + ");\n";
                    page.thumbnail_png = encodePng(thumbnail(dataset.image(frame.labels)));
-                   summary.add(page.camera, frame.outcome);
+                   summary.add(frame, dataset.camera(frame.labels));
                    frames.push_back(std::move(page));
                    records.push_back(std::move(frame.labels));
                  });

@@ -31,7 +31,7 @@ struct ReportTest : testing::Test {
     const Dataset dataset(data);
     const DetectionSource source = [this]() -> FrameDetections {
       return [this](size_t i, const LabelRecord&) {
-        return std::vector<DetectionLine>{shifted(line, {0, i == 0 ? 0.5 : 30})};
+        return Detections{{shifted(line, {0, i == 0 ? 0.5 : 30})}, {}, {}};
       };
     };
     return writeReport(
@@ -107,8 +107,7 @@ TEST_F(ReportTest, NothingIsWrittenWhenADetectionIsBad) {
   const Dataset dataset(data);
   const DetectionSource source = []() -> FrameDetections {
     return [](size_t i, const LabelRecord&) {
-      return i < 2 ? std::vector<DetectionLine>{}
-                   : std::vector<DetectionLine>{hand_made::detection({{1, 1}, {1, 1}})};
+      return i < 2 ? Detections{} : Detections{{hand_made::detection({{1, 1}, {1, 1}})}, {}, {}};
     };
   };
   EXPECT_THROW(

@@ -49,7 +49,7 @@ ordered_json toJson(const GroupSummary& group, const EvaluationOptions& options)
                       {"right_long", toJson(sums.right_long)},
                       {"merged", toJson(sums.merged)},
                       {"merged_long", toJson(sums.merged_long)},
-                      {"fragments_per_found_label", fragments}});
+                      {"fragments_per_found_run", fragments}});
   }
   ordered_json localisation{{"rho_px", options.rho_px.back()}};
   for (const Stratum s : kStrata) {
@@ -75,8 +75,10 @@ void GroupSummary::add(const FrameOutcome& outcome, const EvaluationOptions& opt
       const LabelOutcome& label = outcome.labels[r][i];
       const auto s = size_t(outcome.strata[i]);
       sums.found[s] += {label.found ? 1 : 0, 1};
-      if (label.found) {
-        sums.fragments[s] += {label.fragments, 1};
+    }
+    for (size_t i = 0; i < outcome.run_strata.size(); ++i) {
+      if (const RunOutcome& run = outcome.runs[r][i]; run.found) {
+        sums.fragments[size_t(outcome.run_strata[i])] += {run.fragments, 1};
       }
     }
     for (size_t i = 0; i < outcome.detection_angle_rad.size(); ++i) {
@@ -101,7 +103,9 @@ Summary::Summary(EvaluationOptions evaluation_options)
   options.check();
 }
 
-void Summary::add(const std::string& camera_name, const FrameOutcome& outcome) {
+void Summary::add(const FrameEvaluation& frame, const Camera& camera) {
+  const FrameOutcome& outcome = frame.outcome;
+  const std::string camera_name = cameraName(frame.labels);
   auto it = std::lower_bound(
       cameras.begin(), cameras.end(), camera_name, [](const GroupSummary& g, const std::string& n) {
         return g.name < n;
@@ -111,6 +115,53 @@ void Summary::add(const std::string& camera_name, const FrameOutcome& outcome) {
   }
   it->add(outcome, options);
   all.add(outcome, options);
+
+  const size_t image = images.size();
+  ImageRow& row = images.emplace_back();
+  row.image = frame.labels.image;
+  row.camera = camera_name;
+  row.model = camera.modelName();
+  if (const auto noise = frame.labels.sensor.find("read_noise_levels");
+      frame.labels.sensor.is_object() && noise != frame.labels.sensor.end() && noise->is_number()) {
+    row.noise_levels = noise->get<double>();
+  }
+  row.time_ms = frame.detections.time_ms;
+  row.rectification_ms = frame.detections.rectification_ms;
+
+  for (size_t i = 0; i < frame.labels.lines.size(); ++i) {
+    const LabelLine& line = frame.labels.lines[i];
+    LabelRow& label = labels.emplace_back();
+    label.image = image;
+    label.kind = line.kind;
+    label.conditions = outcome.conditions[i];
+    label.contrast = line.contrast;
+    label.length_px = line.length_px;
+    label.angle_rad = line.angle_rad;
+    const Eigen::Vector3d middle =
+        line.points_in_cam[0].normalized() + line.points_in_cam[1].normalized();
+    label.field_angle_rad = std::atan2(middle.head<2>().norm(), middle.z());
+    for (size_t r = 0; r < options.rho_px.size(); ++r) {
+      const LabelOutcome& at_rho = outcome.labels[r][i];
+      label.found |= at_rho.found ? 1U << r : 0;
+      label.found_score[r] = at_rho.found_score;
+    }
+    label.errors = outcome.errors[i];
+  }
+  for (size_t i = 0; i < frame.detections.lines.size(); ++i) {
+    DetectionRow& detection = detections.emplace_back();
+    detection.image = image;
+    detection.score = outcome.detection_score[i];
+    detection.length_px = outcome.detection_length_px[i];
+    detection.angle_rad = outcome.detection_angle_rad[i];
+    detection.field_angle_rad = outcome.detection_field_angle_rad[i];
+    for (size_t r = 0; r < options.rho_px.size(); ++r) {
+      detection.right |= outcome.detections[r][i].right ? 1U << r : 0;
+      detection.merged |= outcome.detections[r][i].merged ? 1U << r : 0;
+    }
+  }
+  for (size_t k = 0; k < kStructuralKinds; ++k) {
+    structure[k].push_back(frame.structure[k]);
+  }
 }
 
 std::string text(const Ratio& ratio) {
@@ -160,7 +211,7 @@ std::string table(const Summary& summary) {
   }
 
   const std::string at_least = fmt::format(">= {:g} deg", options.headline_angle_rad * 180 / M_PI);
-  out += "\nDetections right, merged / detections; fragments per found headline label\n";
+  out += "\nDetections right, merged / detections; fragments per found headline run\n";
   line("camera",
        "rho_px",
        "right " + at_least,

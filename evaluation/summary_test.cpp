@@ -16,26 +16,37 @@ using hand_made::shifted;
 constexpr auto kHeadline = size_t(Stratum::kHeadline);
 constexpr auto kFaint = size_t(Stratum::kFaint);
 
+/// Evaluated as evaluateFrames does, but for sAP.
+FrameEvaluation frame(const std::string& camera_name,
+                      const Camera& camera,
+                      const std::vector<LabelLine>& labels,
+                      const std::vector<DetectionLine>& detections) {
+  FrameEvaluation result;
+  result.labels.camera = "cameras/" + camera_name + ".yaml";
+  result.labels.lines = labels;
+  result.detections.lines = detections;
+  result.outcome = evaluateFrame(camera, labels, detections, EvaluationOptions{});
+  return result;
+}
+
 /// Two frames. left: a headline label found from rho = 2 on by a detection 1.5 px off, and a faint
 /// one, missed; a short wrong detection. right: a headline label in two pieces; nothing else.
 Summary exampleSummary() {
   const Camera camera = pinholeCamera();
-  const EvaluationOptions options;
   const LabelLine line = label(camera, {100, 200}, {300, 200}, 0);
   LabelLine faint = label(camera, {100, 300}, {300, 300}, 1);
   faint.contrast = 5;
-  Summary summary(options);
-  summary.add(
-      "right",
-      evaluateFrame(camera,
+  Summary summary{EvaluationOptions{}};
+  summary.add(frame("right",
+                    camera,
                     {line},
-                    {detection({{100, 200}, {199, 200}}), detection({{201, 200}, {300, 200}})},
-                    options));
-  summary.add("left",
-              evaluateFrame(camera,
-                            {line, faint},
-                            {shifted(line, {0, 1.5}), detection({{500, 50}, {520, 50}})},
-                            options));
+                    {detection({{100, 200}, {199, 200}}), detection({{201, 200}, {300, 200}})}),
+              camera);
+  summary.add(frame("left",
+                    camera,
+                    {line, faint},
+                    {shifted(line, {0, 1.5}), detection({{500, 50}, {520, 50}})}),
+              camera);
   return summary;
 }
 
@@ -62,7 +73,7 @@ TEST(Summary, PoolsCountsPerCameraAndOverAll) {
   EXPECT_EQ(summary.all.at_rho[1].right_long, (Ratio{3, 3}));  // 20 px are 2.5 degrees
   EXPECT_EQ(summary.all.at_rho[1].merged, (Ratio{0, 4}));
   EXPECT_EQ(summary.all.at_rho[1].merged_long, (Ratio{0, 3}));
-  // Only the found label counts: the one in two pieces is not found.
+  // Only the found run counts: the one in two pieces is not found.
   EXPECT_EQ(summary.all.at_rho[2].fragments[kHeadline], (Ratio{1, 1}));
 
   const DistanceStats& stats = summary.all.localisation[kHeadline];
