@@ -443,7 +443,7 @@ class Maker {
 
   void normals() {
     const auto all = [](const LabelRow&) { return true; };
-    auto strata =
+    auto parts =
         bins<LabelRow>({10, 20, 40}, [](const LabelRow& row) { return row.angle_rad * kDegrees; });
     parts.push_back({"all", all});
     for (const Part<LabelRow>& part : parts) {
