@@ -63,6 +63,8 @@ template <class T>
 using Flag = std::conditional_t<std::is_same_v<T, float>, uint8_t, DLSD_BATCH_FLAG>;
 enum : uint8_t { kInvalid, kValid, kUnsettled };
 
+// Answers are bound to references: gcc 12 keeps small named ones in memory, and vectorises nothing.
+
 template <class M, class T>
 DLSD_BATCH_TARGET void projectBlock(const M& model,
                                     const T* __restrict x,
@@ -76,7 +78,7 @@ DLSD_BATCH_TARGET void projectBlock(const M& model,
   Flag<T> flag[kBlock];
   DLSD_BATCH_LOOP
   for (size_t i = 0; i < n; ++i) {
-    const Pixel<T> p = m.project(x[i], y[i], z[i]);
+    const Pixel<T>& p = m.project(x[i], y[i], z[i]);
     u[i] = p.u;
     v[i] = p.v;
     flag[i] = p.valid ? Flag<T>(kValid) : Flag<T>(kInvalid);
@@ -98,12 +100,12 @@ DLSD_BATCH_TARGET void unprojectBlock(const M& model,
   if constexpr (requires { m.attemptUnproject(u[0], v[0]); }) {
     DLSD_BATCH_LOOP
     for (size_t i = 0; i < n; ++i) {
-      const auto [ray, settled] = m.attemptUnproject(u[i], v[i]);
+      const Attempt<Ray<T>>& ray = m.attemptUnproject(u[i], v[i]);
       x[i] = ray.x;
       y[i] = ray.y;
       z[i] = ray.z;
       const Flag<T> answer = ray.valid ? Flag<T>(kValid) : Flag<T>(kInvalid);
-      flag[i] = settled ? answer : Flag<T>(kUnsettled);
+      flag[i] = ray.settled ? answer : Flag<T>(kUnsettled);
     }
     for (size_t i = 0; i < n; ++i) valid[i] = static_cast<uint8_t>(flag[i]);
     for (size_t i = 0; i < n; ++i) {
@@ -117,7 +119,7 @@ DLSD_BATCH_TARGET void unprojectBlock(const M& model,
   } else {
     DLSD_BATCH_LOOP
     for (size_t i = 0; i < n; ++i) {
-      const Ray<T> ray = m.unproject(u[i], v[i]);
+      const Ray<T>& ray = m.unproject(u[i], v[i]);
       x[i] = ray.x;
       y[i] = ray.y;
       z[i] = ray.z;

@@ -102,9 +102,8 @@ struct FieldAngleLimit {
 
 /// Answer of a kernel of fixed length where only an iteration can answer every case.
 template <class Answer>
-struct Attempt {
-  Answer answer;
-  bool settled;  ///< If not, `answer` says nothing.
+struct Attempt : Answer {
+  bool settled;  ///< If not, the answer says nothing.
 };
 
 template <class M>

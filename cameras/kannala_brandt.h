@@ -15,9 +15,8 @@ namespace dlsd {
 /// Domain: theta < max_theta, where max_theta is the smallest positive sign change of d'(theta), or
 /// pi if there is none below pi; pixels of radius r_d < d(max_theta). Solved once in fromParams.
 ///
-/// Inverse: theta / r_d, fitted when the camera is made as a polynomial in 1 - sqrt(1 - r_d / R),
-/// which takes the root out of a fold at R, and two of Newton's steps. Where these have not arrived
-/// (near folds and inflections, or beyond kStartAngle), Newton's iteration inside a bracket that
+/// Inverse: two of Newton's steps from a start fitted when the camera is made. Where these have not
+/// arrived (near folds and inflections, or beyond kStartAngle), his iteration inside a bracket that
 /// always holds the solution. Source: Kannala and Brandt, "A generic camera model ..." (PAMI 2006),
 /// radial part only.
 struct KannalaBrandt {
@@ -36,9 +35,7 @@ struct KannalaBrandt {
   double fx = 1, fy = 1, cx = 0, cy = 0, k1 = 0, k2 = 0, k3 = 0, k4 = 0;
   double max_theta = M_PI;   ///< Derived, rad.
   double max_radius = M_PI;  ///< Derived: d(max_theta).
-  /// Derived: the fit for the start, and its R.
-  std::array<double, 10> start{};
-  double start_radius = M_PI;
+  FittedStart start{};       ///< Derived: of the angle over the radius.
 
   [[nodiscard]] static KannalaBrandt fromParams(const std::array<double, 8>& p) {
     KannalaBrandt m{p[0], p[1], p[2], p[3], p[4], p[5], p[6], p[7]};
@@ -47,7 +44,9 @@ struct KannalaBrandt {
     const std::vector<double> turns = signChanges(slope, 0, M_PI * M_PI);
     if (!turns.empty()) m.max_theta = std::min(std::sqrt(turns.front()), M_PI);
     m.max_radius = m.distort(m.max_theta);
-    m.fitStart();
+    m.start = FittedStart::fit(m.distort(std::min(m.max_theta, kStartAngle)),
+                               m.max_radius,
+                               [&](double r_d) { return m.undistort(r_d); });
     return m;
   }
   [[nodiscard]] std::array<double, 8> params() const { return {fx, fy, cx, cy, k1, k2, k3, k4}; }
@@ -77,14 +76,14 @@ struct KannalaBrandt {
 
   template <class T>
   [[nodiscard, gnu::always_inline]] Ray<T> unproject(T u, T v) const {
-    const auto [ray, settled] = attemptUnproject(u, v);
-    return settled ? ray : iterateUnproject(u, v);
+    const auto& attempt = attemptUnproject(u, v);
+    return attempt.settled ? static_cast<Ray<T>>(attempt) : iterateUnproject(u, v);
   }
 
   template <class T>
   [[nodiscard, gnu::always_inline]] Attempt<Ray<T>> attemptUnproject(T u, T v) const {
-    const Radial<T> m = radial(u, v);
-    T theta = startFor(m.r_d);
+    const auto& m = radial(u, v);
+    T theta = start.at(m.r_d);
     T slope, step, curvature;
     // Each step squares the error: 1e-5, 1e-10, 1e-20 where the fit is good.
     for (int i = 0; i < (std::is_same_v<T, float> ? 1 : 2); ++i) {
@@ -162,26 +161,6 @@ struct KannalaBrandt {
   template <class T>
   [[nodiscard, gnu::always_inline]] T distortion(T t) const {
     return (T(k1) + t * T(k2)) + (t * t) * (T(k3) + t * T(k4));
-  }
-
-  /// Where Newton's steps start; not a number beyond start_radius.
-  template <class T>
-  [[nodiscard, gnu::always_inline]] T startFor(T r_d) const {
-    const T w = T(1) - std::sqrt(T(1) - r_d * T(1 / start_radius));
-    const T w2 = w * w, w4 = w2 * w2;
-    const auto pair = [&](size_t i) { return T(start[i]) + w * T(start[i + 1]); };
-    return r_d * ((pair(0) + w2 * pair(2)) + w4 * ((pair(4) + w2 * pair(6)) + w4 * pair(8)));
-  }
-
-  void fitStart() {
-    const double angle = std::min(max_theta, kStartAngle), radius = distort(angle);
-    // A fold just beyond the end of the fit needs the root as well.
-    start_radius = std::min(max_radius, 1.1 * radius);
-    const double w_end = 1 - std::sqrt(std::max(0.0, 1 - radius / start_radius));
-    start = interpolateAtChebyshevNodes<10>(w_end, [&](double w) {
-      const double r_d = start_radius * w * (2 - w);
-      return undistort(r_d) / r_d;
-    });
   }
 };
 static_assert(CameraModel<KannalaBrandt>);

@@ -1,7 +1,11 @@
 #pragma once
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <type_traits>
+
+#include "cameras/polynomial.h"
 
 namespace dlsd {
 
@@ -37,5 +41,39 @@ template <class T, class Function>
   }
   return x;
 }
+
+/// Where Newton's method for the inverse y of a rising x(y), y(0) = 0, starts: y / x as a
+/// polynomial in 1 - sqrt(1 - x / fold), which takes the root out of a fold of x(y) at `fold`.
+/// Fitted when a model is made; typically right to 1e-3 ... 1e-7.
+struct FittedStart {
+  std::array<double, 10> c{};
+  double fold = 1;
+
+  /// @param end      Up to here the fit holds, and beyond it as far as nothing happens.
+  /// @param fold     Where x(y) turns, at least `end`; infinity if it does not.
+  /// @param inverse  y(x).
+  template <class Inverse>
+  [[nodiscard]] static FittedStart fit(double end, double fold, const Inverse& inverse) {
+    FittedStart start;
+    // Where a fold is far away, a root near the end does no harm.
+    start.fold = std::min(fold, 1.1 * end);
+    const double w_end = 1 - std::sqrt(std::max(0.0, 1 - end / start.fold));
+    start.c = interpolateAtChebyshevNodes<10>(w_end, [&](double w) {
+      const double x = start.fold * w * (2 - w);
+      return inverse(x) / x;
+    });
+    return start;
+  }
+  bool operator==(const FittedStart&) const = default;
+
+  /// About y(x); not a number for x > fold.
+  template <class T>
+  [[nodiscard, gnu::always_inline]] T at(T x) const {
+    const T w = T(1) - std::sqrt(T(1) - x * T(1 / fold));
+    const T w2 = w * w, w4 = w2 * w2;
+    const auto pair = [&](size_t i) { return T(c[i]) + w * T(c[i + 1]); };
+    return x * ((pair(0) + w2 * pair(2)) + w4 * ((pair(4) + w2 * pair(6)) + w4 * pair(8)));
+  }
+};
 
 }  // namespace dlsd

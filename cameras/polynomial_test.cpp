@@ -35,5 +35,18 @@ TEST(SignChanges, TakeVanishingCoefficientsAsTheyCome) {
   EXPECT_TRUE(signChanges({}, 0, 10).empty());
 }
 
+TEST(Polynomial, InterpolationGivesBackAPolynomialAndComesNearAFunction) {
+  const std::array<double, 5> known{1, -2, 0, 3, 0.5};
+  const auto same =
+      interpolateAtChebyshevNodes<5>(2, [&](double x) { return evalPolynomial(known, x); });
+  for (size_t i = 0; i < known.size(); ++i) EXPECT_NEAR(same[i], known[i], 1e-13) << i;
+
+  const auto sine = interpolateAtChebyshevNodes<10>(1, [](double x) { return std::sin(x); });
+  for (double x = 0; x <= 1; x += 0.01) {
+    // max |sin^(10)| / (10! 2^19)
+    EXPECT_NEAR(evalPolynomial(sine, x), std::sin(x), 6e-13) << x;
+  }
+}
+
 }  // namespace
 }  // namespace dlsd
