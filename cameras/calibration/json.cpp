@@ -34,10 +34,15 @@ constexpr std::array<BasaltModel, 6> kBasaltModels{
 /// The unified model with weights 1 - alpha and alpha instead of 1 and xi, and a focal length to
 /// match: alpha = xi / (1 + xi), f = gamma / (1 + xi).
 void omniFromUcm(std::vector<double>* params) {
+  constexpr double kRounding = 1e-12;  // Relative: what a parameter at its bound may be beyond it.
   const double scale = 1 - params->at(0);
-  params->at(0) /= scale;
-  params->at(1) /= scale;
-  params->at(2) /= scale;
+  const std::span<const ParamSpec> specs = paramSpecsOf("omni");
+  for (size_t i = 0; i < 3; ++i) {
+    double& value = params->at(i);
+    value /= scale;
+    const double clamped = std::clamp(value, specs[i].min, specs[i].max);
+    if (std::abs(value - clamped) <= kRounding * std::abs(clamped)) value = clamped;
+  }
 }
 void ucmFromOmni(std::vector<double>* params) {
   const double scale = 1 + params->at(0);
@@ -70,6 +75,8 @@ Camera readBasaltCamera(const Field& entry, std::pair<int, int> size) {
     Allowed allowed = allowedBy(specOf(m.model, m.names.at(i)));
     if (m.type == "ucm" && m.keys.at(i) == "alpha") {
       allowed.max = allowed.max / (1 + allowed.max);
+    } else if (m.type == "ucm" && m.keys.at(i).starts_with('f')) {
+      allowed.min = allowed.min / (1 + specOf(m.model, "xi").max);
     }
     params.at(indexOf(m.model, m.names.at(i))) = intrinsics.at(m.keys.at(i)).number(allowed);
   }

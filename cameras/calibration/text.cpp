@@ -254,7 +254,7 @@ Loaded readColmap(const Document& document) {
   loaded.from_corner = true;
   std::vector<std::string> seen;
   for (const TextLine& line : document.lines) {
-    constexpr int kMaxId = 99'999'999;
+    constexpr int kMaxId = 999'999'999;  // As in cam999999999.
     const int id = line.word(document.source, 0, "CAMERA_ID").integer(0, kMaxId);
     seen.push_back("cam" + std::to_string(id));
     loaded.cameras.push_back({seen.back(), readColmapCamera(document, line)});
