@@ -155,6 +155,21 @@ Point3 referenceUnproject(const Eucm& m, double u, double v) {
   return unit(mx, my, z);
 }
 
+Point2 referenceProject(const DoubleSphere& m, double x, double y, double z) {
+  const double r2 = x * x + y * y;
+  const double z1 = z + m.xi * std::sqrt(r2 + z * z);
+  const double denominator = m.alpha * std::sqrt(r2 + z1 * z1) + (1 - m.alpha) * z1;
+  return {m.fx * x / denominator + m.cx, m.fy * y / denominator + m.cy};
+}
+Point3 referenceUnproject(const DoubleSphere& m, double u, double v) {
+  const double mx = (u - m.cx) / m.fx, my = (v - m.cy) / m.fy;
+  const double r2 = mx * mx + my * my;
+  const double mz = (1 - m.alpha * m.alpha * r2) /
+                    (m.alpha * std::sqrt(1 - (2 * m.alpha - 1) * r2) + 1 - m.alpha);
+  const double k = (mz * m.xi + std::sqrt(mz * mz + (1 - m.xi * m.xi) * r2)) / (mz * mz + r2);
+  return {k * mx, k * my, k * mz - m.xi};
+}
+
 // --- Cameras of about 1280 x 1024, each near one that exists ---
 
 Camera exampleCamera(std::string_view model) {
@@ -170,6 +185,8 @@ Camera exampleCamera(std::string_view model) {
       {"pinhole_radtan",
        {779.71, 777.40, 640.2, 512.3, -0.28340811, 0.07395907, 0.00019359, 1.76187e-05, 0}},
       {"eucm", {0.6, 1.1, 380, 380, 640, 512}},
+      // TUM-VI as in the paper, 2.5 times as large.
+      {"double_sphere", {-0.18, 0.59, 392.5, 392.5, 637.8, 512.5}},
   };
   return makeCamera(model, params.at(model), kWidth, kHeight);
 }

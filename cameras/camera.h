@@ -11,6 +11,7 @@
 #include <variant>
 #include <vector>
 
+#include "cameras/double_sphere.h"
 #include "cameras/eucm.h"
 #include "cameras/fov.h"
 #include "cameras/kannala_brandt.h"
@@ -21,7 +22,7 @@
 namespace dlsd {
 
 using CameraModelVariant =
-    std::variant<Pinhole, Fov, KannalaBrandt, UnifiedOmni, PinholeRadtan, Eucm>;
+    std::variant<Pinhole, Fov, KannalaBrandt, UnifiedOmni, PinholeRadtan, Eucm, DoubleSphere>;
 
 /// A calibrated central camera. A value: cheap to copy, comparable, immutable.
 class Camera {

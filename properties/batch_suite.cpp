@@ -41,6 +41,7 @@ constexpr Budget kBudgets[] = {
     {"omni", 3e-12, 2e-12, 1.5e-3, 1e-3},
     {"pinhole_radtan", 4e-12, 2e-12, 3e-3, 1e-3},
     {"eucm", 3e-12, 2e-12, 2e-3, 1e-3},
+    {"double_sphere", 4e-12, 3e-12, 3e-3, 2e-3},
 };
 
 Budget budgetOf(std::string_view model) {

@@ -24,6 +24,12 @@ Real fieldAngle(Real x, Real y, Real z) {
   return std::atan2(std::hypot(x, y), z);
 }
 
+/// cos(theta) + xi. Near xi = +-1 long double is not enough to take the cosine from 1.
+Real shiftedCosine(Real theta, Real xi) {
+  const Real cosine = std::cos(theta / 2), sine = std::sin(theta / 2);
+  return theta > kPi / 2 ? (xi - 1) + 2 * cosine * cosine : (xi + 1) - 2 * sine * sine;
+}
+
 Real distortion(const KannalaBrandt& m, Real theta) {
   return theta + m.k1 * std::pow(theta, 3) + m.k2 * std::pow(theta, 5) + m.k3 * std::pow(theta, 7) +
          m.k4 * std::pow(theta, 9);
@@ -321,6 +327,46 @@ Real oracleMaxFieldAngle(const Eucm& m) {
 Real oracleMaxRadius(const Eucm& m) {
   const Real alpha = m.alpha;
   return alpha <= 0.5L ? kInfinity : 1 / std::sqrt(m.beta * (2 * alpha - 1));
+}
+
+std::optional<Oracle2> oracleProject(const DoubleSphere& m, Real x, Real y, Real z) {
+  const Real theta = fieldAngle(x, y, z);
+  if (!(theta < oracleMaxFieldAngle(m))) return std::nullopt;
+  const Real r2 = x * x + y * y;
+  const Real z1 = std::sqrt(r2 + z * z) * shiftedCosine(theta, m.xi);
+  const Real denom = m.alpha * std::sqrt(r2 + z1 * z1) + (1 - static_cast<Real>(m.alpha)) * z1;
+  return Oracle2{m.fx * (x / denom) + m.cx, m.fy * (y / denom) + m.cy};
+}
+
+Real oracleMaxFieldAngle(const DoubleSphere& m) {
+  // One entry is enough: tests ask for many rays of one camera in a row.
+  thread_local DoubleSphere known{};
+  thread_local Real known_answer = kPi / 2;
+  if (m == known) return known_answer;
+  known = m;
+  if (m.xi >= 1) {
+    known_answer = std::acos(-1 / static_cast<Real>(m.xi));
+    return known_answer;
+  }
+  // The angle of the second sphere rises with the field angle: where it reaches that model's bound.
+  const Real alpha = m.alpha;
+  const Real second_bound = std::acos(alpha <= 0.5L ? -alpha / (1 - alpha) : -(1 - alpha) / alpha);
+  Real inside = 0, outside = kPi;
+  for (int k = 0; k < 80; ++k) {
+    const Real theta = (inside + outside) / 2;
+    (std::atan2(std::sin(theta), shiftedCosine(theta, m.xi)) < second_bound ? inside : outside) =
+        theta;
+  }
+  known_answer = outside;
+  return known_answer;
+}
+Real oracleMaxRadius(const DoubleSphere& m) {
+  const Real alpha = m.alpha, xi = m.xi;
+  if (xi >= 1) {
+    const Real sine = 1 / xi;
+    return sine / (alpha + (1 - alpha) * std::sqrt(1 - sine * sine));
+  }
+  return alpha <= 0.5L ? kInfinity : 1 / std::sqrt(2 * alpha - 1);
 }
 
 }  // namespace dlsd
