@@ -98,11 +98,10 @@ size_t findNoText(std::string_view text) {
     const auto c = static_cast<unsigned char>(text[i]);
     if ((c < 0x20 && c != '\t' && c != '\r' && c != '\n') || c == 0x7f) return i;
     size_t length = 1;
-    uint32_t code = c;
     if (c >= 0x80) {
       length = c >= 0xf0 ? 4 : (c >= 0xe0 ? 3 : 2);
       if (c < 0xc2 || c > 0xf4 || i + length > text.size()) return i;
-      code = c & (0x7fU >> length);
+      uint32_t code = c & (0x7fU >> length);
       for (size_t k = 1; k < length; ++k) {
         const auto next = static_cast<unsigned char>(text[i + k]);
         if ((next & 0xc0U) != 0x80) return i;

@@ -22,6 +22,15 @@ namespace dlsd::calib {
 [[nodiscard]] std::string inQuotes(std::string_view text);
 /// "a, b, c".
 [[nodiscard]] std::string listed(std::span<const std::string_view> names);
+/// One column of a table of names.
+template <class Table, class Row>
+[[nodiscard]] std::vector<std::string_view> column(const Table& table,
+                                                   std::string_view Row::*member) {
+  std::vector<std::string_view> names;
+  names.reserve(table.size());
+  for (const Row& row : table) names.push_back(row.*member);
+  return names;
+}
 
 /// Shortest text that reads back as the same number.
 [[nodiscard]] std::string shortest(double value);

@@ -64,8 +64,7 @@ Camera readBasaltCamera(const Field& entry, std::pair<int, int> size) {
   constexpr std::array<std::string_view, 2> kNeeded{"camera_type", "intrinsics"};
   constexpr std::array<std::string_view, 1> kOptional{"max_field_angle"};
   entry.expectKeys(kNeeded, kOptional);
-  std::vector<std::string_view> types;
-  for (const BasaltModel& m : kBasaltModels) types.push_back(m.type);
+  const std::vector<std::string_view> types = column(kBasaltModels, &BasaltModel::type);
   const BasaltModel& m = kBasaltModels.at(entry.at("camera_type").oneOf(types));
   const Field intrinsics = entry.at("intrinsics");
   const size_t count = countOf(m);
@@ -143,9 +142,7 @@ std::string writeBasalt(const std::vector<NamedCamera>& cameras) {
           return m.model == camera.modelName();
         });
     if (known == kBasaltModels.end()) {
-      std::vector<std::string_view> models;
-      for (const BasaltModel& m : kBasaltModels) models.push_back(m.model);
-      refuseModel(entry, "basalt", models);
+      refuseModel(entry, "basalt", column(kBasaltModels, &BasaltModel::model));
     }
     std::vector<double> params = camera.params();
     if (known->type == "ucm") ucmFromOmni(&params);

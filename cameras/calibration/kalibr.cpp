@@ -102,11 +102,12 @@ Loaded readKalibr(const Document& document) {
     document.field().fail("is not a Kalibr camchain: a map of cam0, cam1, ... is expected");
   }
   Loaded loaded;
-  for (const std::string& name : document.root.keys) {
+  for (size_t i = 0; i < document.root.keys.size(); ++i) {
+    const std::string& name = document.root.keys[i];
     if (!cameraNumber(name)) {
       document.field().fail("unknown key " + inQuotes(name) + ", allowed are cam0, cam1, ...");
     }
-    loaded.cameras.push_back({name, readEntry(document.field().at(name))});
+    loaded.cameras.push_back({name, readEntry({document.root.items[i], document.source, name})});
   }
   if (loaded.cameras.empty()) {
     document.field().fail("holds no camera, cam0, cam1, ... are expected");
@@ -123,9 +124,7 @@ std::string writeKalibr(const std::vector<NamedCamera>& cameras) {
           return m.name == camera.modelName();
         });
     if (known == kModels.end()) {
-      std::vector<std::string_view> models;
-      for (const KalibrModel& m : kModels) models.push_back(m.name);
-      refuseModel(entry, "kalibr", models);
+      refuseModel(entry, "kalibr", column(kModels, &KalibrModel::name));
     }
     const KalibrModel& model = *known;
     const std::vector<double> params = camera.params();

@@ -13,13 +13,12 @@ namespace {
 using Names = std::span<const std::string_view>;
 
 // What programs call it; the first is what we write.
-constexpr std::array<std::string_view, 9> kCameraMatrix{"camera_matrix",
+constexpr std::array<std::string_view, 8> kCameraMatrix{"camera_matrix",
                                                         "cameraMatrix",
                                                         "Camera_Matrix",
                                                         "CameraMatrix",
                                                         "camera_intrinsics",
                                                         "intrinsic_matrix",
-                                                        "intrinsics",
                                                         "mtx",
                                                         "K"};
 constexpr std::array<std::string_view, 12> kDistortion{"distortion_coefficients",
@@ -278,9 +277,9 @@ Loaded readStorage(const Document& document, Lens lens) {
       }
     }
   }
-  const std::optional<Field> K_field = findOne(root, kCameraMatrix);
-  if (!K_field) root.fail("has no camera matrix: camera_matrix (or K) is missing");
-  const CameraMatrix K = cameraMatrix(*K_field);
+  const std::optional<Field> matrix_field = findOne(root, kCameraMatrix);
+  if (!matrix_field) root.fail("has no camera matrix: camera_matrix (or K) is missing");
+  const CameraMatrix K = cameraMatrix(*matrix_field);
   const std::pair<int, int> size = imageSize(root);
   const std::optional<Field> D = findOne(root, kDistortion), xi = findOne(root, kXi),
                              fisheye = findOne(root, kFisheyeModel),
@@ -321,7 +320,7 @@ Loaded readStorage(const Document& document, Lens lens) {
 
   const auto camera = [&]() -> Camera {
     if (lens == Lens::kFisheye) {
-      refuseSkew(*K_field, K.skew);
+      refuseSkew(*matrix_field, K.skew);
       const std::array<double, 4> k = fisheyeCoefficients(vectorOf(*D, {4}));
       std::vector<double> params(K.fx_fy_cx_cy.begin(), K.fx_fy_cx_cy.end());
       params.insert(params.end(), k.begin(), k.end());
@@ -340,7 +339,7 @@ Loaded readStorage(const Document& document, Lens lens) {
       distortion.push_back(K.skew);
       return root.omniOrRadtan(params, distortion, size, max_field_angle);
     }
-    refuseSkew(*K_field, K.skew);
+    refuseSkew(*matrix_field, K.skew);
     const std::array<double, 5> k =
         D ? radtanCoefficients(vectorOf(*D, {0, 4, 5, 8, 12, 14})) : std::array<double, 5>{};
     return root.pinholeOrRadtan(K.fx_fy_cx_cy, k, size, max_field_angle);
@@ -480,9 +479,9 @@ bool isRos(const Document& document) {
 Loaded readRos(const Document& document) {
   const Field root = document.field();
   root.expectKeys(kRosNeeded, kMaxFieldAngle, kRosIgnored);
-  const Field K_field = root.at("camera_matrix");
-  const CameraMatrix K = cameraMatrix(K_field);
-  refuseSkew(K_field, K.skew);
+  const Field matrix_field = root.at("camera_matrix");
+  const CameraMatrix K = cameraMatrix(matrix_field);
+  refuseSkew(matrix_field, K.skew);
   const std::pair<int, int> size{root.at("image_width").imageSize(),
                                  root.at("image_height").imageSize()};
   const double max_field_angle =

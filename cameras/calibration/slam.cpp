@@ -182,7 +182,7 @@ constexpr std::array<CamodocalModel, 4> kCamodocalModels{
 // ORB-SLAM3
 
 /// Settings beside the camera's intrinsics, by how their names begin.
-constexpr std::array<std::string_view, 11> kOrbIgnoredPrefixes{"Stereo.",
+constexpr std::array<std::string_view, 12> kOrbIgnoredPrefixes{"Stereo.",
                                                                "RGBD.",
                                                                "IMU.",
                                                                "ORBextractor.",
@@ -192,7 +192,8 @@ constexpr std::array<std::string_view, 11> kOrbIgnoredPrefixes{"Stereo.",
                                                                "loopClosing",
                                                                "ThDepth",
                                                                "DepthMapFactor",
-                                                               "T"};  // Tbc, Tlr, T_c1_c2
+                                                               "Tbc",
+                                                               "Tlr"};
 constexpr std::array<std::string_view, 17> kOrbCameraIgnored{"fps",
                                                              "RGB",
                                                              "bf",
@@ -285,8 +286,7 @@ bool isCamodocal(const Document& document) {
 
 Loaded readCamodocal(const Document& document) {
   const Field root = document.field();
-  std::vector<std::string_view> models;
-  for (const CamodocalModel& m : kCamodocalModels) models.push_back(m.name);
+  const std::vector<std::string_view> models = column(kCamodocalModels, &CamodocalModel::name);
   const CamodocalModel& model = kCamodocalModels.at(root.at("model_type").oneOf(models));
   std::vector<std::string_view> needed(kCamodocalNeeded.begin(), kCamodocalNeeded.end());
   for (const std::string_view part : model.parts) {

@@ -89,12 +89,11 @@ Camera readColmapCamera(const Document& document, const TextLine& line) {
   if (line.words.size() < kFirstParam) {
     failLine(document, line, "must be CAMERA_ID MODEL WIDTH HEIGHT PARAMS...");
   }
-  std::vector<std::string_view> names;
-  for (const ColmapModel& m : kColmapModels) names.push_back(m.name);
+  std::vector<std::string_view> names = column(kColmapModels, &ColmapModel::name);
   names.push_back(kColmapPanorama);
   const size_t model = word(1, "MODEL").oneOf(names);
   const std::pair<int, int> size{word(2, "WIDTH").imageSize(), word(3, "HEIGHT").imageSize()};
-  const auto expectCount = [&](size_t count, std::span<const std::string_view> params) {
+  const auto expect_count = [&](size_t count, std::span<const std::string_view> params) {
     if (line.words.size() - kFirstParam != count) {
       failLine(document,
                line,
@@ -106,14 +105,14 @@ Camera readColmapCamera(const Document& document, const TextLine& line) {
   const Field place(document.root, document.source, "line " + std::to_string(line.number));
   if (names[model] == kColmapPanorama) {
     constexpr std::array<std::string_view, 2> kParams{"w", "h"};
-    expectCount(2, kParams);
+    expect_count(2, kParams);
     (void)word(kFirstParam, "w").integer(size.first, size.first, true);
     (void)word(kFirstParam + 1, "h").integer(size.second, size.second, true);
     return place.camera("equirectangular", panoramaParams(size.first, size.second), size);
   }
   const ColmapModel& m = kColmapModels.at(model);
   const size_t count = countOf(m);
-  expectCount(count, std::span(m.params).first(count));
+  expect_count(count, std::span(m.params).first(count));
   const std::span<const ParamSpec> specs = paramSpecsOf(m.model);
   std::vector<double> params(specs.size(), 0);
   const auto set = [&](std::string_view name, double value) {
