@@ -48,8 +48,9 @@ struct PinholeRadtan {
 
   template <class T>
   [[nodiscard]] Ray<T> unproject(T u, T v) const {
+    using W = Wider<T>;
     const auto [x, y, valid] =
-        radtan.undistort((u - T(cx)) / T(fx), (v - T(cy)) / T(fy), radtan.max_radius);
+        radtan.undistort<T>((W(u) - W(cx)) / W(fx), (W(v) - W(cy)) / W(fy), radtan.max_radius);
     const auto scale = 1 / std::sqrt(x * x + y * y + 1);
     return {static_cast<T>(x * scale),
             static_cast<T>(y * scale),

@@ -20,16 +20,16 @@ struct PlanePoint {
 ///
 ///   D(x, y) = (x R + 2 p1 x y + p2 (t + 2 x^2),  y R + p1 (t + 2 y^2) + 2 p2 x y)
 ///
-/// With p = (p2, p1) this is D(q) = (R + 2 p.q) q + p |q|^2, the gradient of a potential: its
+/// With p = (p2, p1) this is D(n) = (R + 2 p.n) n + p |n|^2, the gradient of a potential: its
 /// Jacobian is symmetric, and on a disc where it is positive definite D is one-to-one. In the polar
-/// frame at radius r, with f = r R(r^2), q = 2 |p| r and c the cosine of the angle between p and
-/// the point, the Jacobian is diag(f', R) + q ((3 c, s), (s, c)). Its determinant is quadratic in c
-/// and positive for all c as long as f' > 3 q, R > q and, where f' + 3 R < 8 q, (f' - R)(9 R - f')
-/// > 16 q^2: polynomials in r.
+/// frame at radius r, with f = r R(r^2), q = 2 |p| r, and c, s the cosine and sine of the angle
+/// between p and the point, it is diag(f', R) + q ((3 c, s), (s, c)). Its determinant is quadratic
+/// in c and positive for all c as long as f' > 3 q (from which R > 1.5 q follows by integration)
+/// and, where f' + 3 R < 8 q, (f' - R)(9 R - f') > 16 q^2: polynomials in r.
 ///
 /// Domain: the disc r < max_radius, where the first of these fails, solved once in make.
 ///
-/// Inverse: D(q) = m at |q| = r means that q is along m - p r^2. So q = r e with e = (m - p r^2) /
+/// Inverse: D(n) = m at |n| = r means that n is along m - p r^2. So n = r e with e = (m - p r^2) /
 /// |m - p r^2|, and r is a zero of h(r) = f(r) - e.(m - 3 p r^2), whose slope there is det J over a
 /// positive number. Since D is one-to-one, h has one zero in the disc, where it rises through 0, or
 /// none: m has an inverse if and only if h(max_radius) > 0, and it is in the bracket [0,
@@ -66,11 +66,12 @@ struct Radtan {
     return J;
   }
 
-  /// The point of the disc r < `radius` (at most max_radius) that D maps to (mx, my), to the last
-  /// bits of T. Exact: valid if and only if there is one.
+  /// The point of the disc r < `radius` (at most max_radius) that D maps to (u, v), to more bits
+  /// than T has. Exact: valid if and only if there is one.
   template <class T>
-  [[nodiscard]] PlanePoint<Wider<T>> undistort(T mx, T my, double radius) const {
+  [[nodiscard]] PlanePoint<Wider<T>> undistort(Wider<T> u, Wider<T> v, double radius) const {
     using W = Wider<T>;
+    const T mx = static_cast<T>(u), my = static_cast<T>(v);
     const T px = T(p2), py = T(p1);
     const auto h = [&](T r) -> ValueAndSlope<T> {
       const T t = r * r;
@@ -90,16 +91,16 @@ struct Radtan {
     const T length = std::sqrt(mx * mx + my * my);
     const T r = valid ? bracketedRoot(h, T(0), hi, length < hi / 2 ? length : hi / 2) : T(0);
     const W t = static_cast<W>(r) * r;
-    W x = mx - static_cast<W>(px) * t, y = my - static_cast<W>(py) * t;
+    W x = u - W(p2) * t, y = v - W(p1) * t;
     const W norm = std::sqrt(x * x + y * y);
     const W scale = norm > 0 ? static_cast<W>(r) / norm : W(1);
     x *= scale;
     y *= scale;
     // What is left of rounding, by one more step in both coordinates.
-    const auto [u, v] = distort(x, y);
+    const auto [back_u, back_v] = distort(x, y);
     const Eigen::Matrix<W, 2, 2> J = jacobian(x, y);
     const W determinant = J(0, 0) * J(1, 1) - J(0, 1) * J(1, 0);
-    const W ru = u - mx, rv = v - my;
+    const W ru = back_u - u, rv = back_v - v;
     const W dx = (J(1, 1) * ru - J(0, 1) * rv) / determinant;
     const W dy = (J(0, 0) * rv - J(1, 0) * ru) / determinant;
     const bool close = std::sqrt(dx * dx + dy * dy) <= W(1e-4) * static_cast<W>(r);
@@ -108,12 +109,7 @@ struct Radtan {
 
  private:
   [[nodiscard]] static double findMaxRadius(double k1, double k2, double k3, double p) {
-    const auto firstOf = [](const auto& polynomial) {
-      const std::vector<double> found = signChanges(polynomial, 0, kUnbounded);
-      return found.empty() ? kUnbounded : found.front();
-    };
     const std::array<double, 7> radial{1, -6 * p, 3 * k1, 0, 5 * k2, 0, 7 * k3};  // f' - 3 q
-    const std::array<double, 7> tangential{1, -2 * p, k1, 0, k2, 0, k3};          // R - q
     const std::array<double, 7> skewed{
         2, -8 * p, 3 * k1, 0, 4 * k2, 0, 5 * k3};  // (f' + 3 R - 8 q) / 2
     // ((f' - R)(9 R - f') - 16 q^2) / (4 t), in t = r^2.
@@ -123,7 +119,8 @@ struct Radtan {
                                       10 * k1 * k3 + 4 * k2 * k2,
                                       8 * k2 * k3,
                                       3 * k3 * k3};
-    double radius = std::min(firstOf(radial), firstOf(tangential));
+    const std::vector<double> ends = signChanges(radial, 0, kUnbounded);
+    double radius = ends.empty() ? kUnbounded : ends.front();
     for (const double t : signChanges(inner, 0, radius * radius)) {
       if (evalPolynomial(skewed, std::sqrt(t)) < 0) radius = std::min(radius, std::sqrt(t));
     }

@@ -185,10 +185,12 @@ rc::Gen<double> genParam(const ParamSpec& spec, Range range) {
   if (range == Range::kRealistic) return genReal(spec.realistic_min, spec.realistic_max);
   const rc::Gen<double> realistic = genReal(spec.realistic_min, spec.realistic_max);
   const rc::Gen<double> uniform = genReal(spec.min, spec.max);
-  const double least = spec.min > 0 ? spec.min : spec.max * 1e-12;
-  const rc::Gen<double> positive = genLogReal(least, spec.max);
+  // On each side of 0 that the range has: uniform in the logarithm, down to 1e-12 of its bound.
+  const rc::Gen<double> positive =
+      spec.max > 0 ? genLogReal(std::max(spec.min, spec.max * 1e-12), spec.max) : uniform;
   const rc::Gen<double> negative =
-      spec.min < 0 ? rc::gen::map(genLogReal(-spec.min * 1e-12, -spec.min), std::negate<>())
+      spec.min < 0 ? rc::gen::map(genLogReal(std::max(-spec.max, -spec.min * 1e-12), -spec.min),
+                                  std::negate<>())
                    : positive;
   return rc::gen::mapcat(genInt(0, 3), [=](int kind) {
     return kind == 0 ? realistic : kind == 1 ? positive : kind == 2 ? negative : uniform;

@@ -1,0 +1,160 @@
+#pragma once
+#include <algorithm>
+#include <array>
+
+#include "cameras/camera_model.h"
+#include "cameras/newton.h"
+#include "cameras/polynomial.h"
+
+namespace dlsd {
+
+/// OCamCalib's model (Scaramuzza, Martinelli and Siegwart, "A toolbox for easily calibrating
+/// omnidirectional cameras", IROS 2006), defined by its polynomial from camera to world:
+///
+///   f(rho) = a0 + a1 rho + ... + a8 rho^8,  a0 < 0
+///   u = x' + e y' + cx,  v = d x' + c y' + cy,  ray along (x', y', -f(rho)),  rho = |(x', y')|, px
+///
+/// Their camera looks along -z and their x is the row: (x, y, z) = (y', x', -z') in our frame, and
+/// [c d; e 1] is their matrix from the ideal to the real sensor, for (row, column).
+///
+/// Domain: the field angle atan2(rho, -f(rho)) must rise: rho < max_rho, the first sign change of
+/// rho f'(rho) - f(rho). If there is none the field angle rises to its limit, that of (rho, -f) at
+/// infinity. Solved once in fromParams. The inverse (from ray to rho) is a bracketed Newton
+/// iteration, run to the last bits; the files' fitted inverse polynomial is not used.
+///
+/// c, d and e are bounded so that their matrix can always be inverted (determinant >= 0.01).
+struct Ocam {
+  static constexpr std::string_view kName = "ocam";
+  static constexpr std::array<ParamSpec, 14> kParams{{
+      {"a0", "px", -1e7, -1e-3, -2000, -100},
+      {"a1", "1", -1e3, 1e3, -0.01, 0.01},
+      {"a2", "1/px", -10, 10, 0, 2e-3},
+      {"a3", "1/px^2", -1, 1, -1e-6, 1e-6},
+      {"a4", "1/px^3", -1e-3, 1e-3, -5e-10, 1e-9},
+      {"a5", "1/px^4", -1e-5, 1e-5, -1e-13, 1e-13},
+      {"a6", "1/px^5", -1e-7, 1e-7, -2e-16, 2e-16},
+      {"a7", "1/px^6", -1e-9, 1e-9, -2e-19, 2e-19},
+      {"a8", "1/px^7", -1e-12, 1e-12, -2e-22, 2e-22},
+      {"cx", "px", -1e6, 1e6, 50, 2000},
+      {"cy", "px", -1e6, 1e6, 50, 2000},
+      {"c", "1", 0.1, 10, 0.9, 1.1},
+      {"d", "1", -0.3, 0.3, -0.01, 0.01},
+      {"e", "1", -0.3, 0.3, -0.01, 0.01},
+  }};
+  /// Stands for "no bound": at this rho, pixels are beyond kMaxPixel whatever the parameters.
+  static constexpr double kUnbounded = 1e13;
+
+  std::array<double, 9> a{-1, 0, 0, 0, 0, 0, 0, 0, 0};
+  double cx = 0, cy = 0, c = 1, d = 0, e = 0;
+  double max_rho = kUnbounded;  ///< Derived, px.
+  double max_theta = M_PI / 2;  ///< Derived: the field angle there, rad.
+
+  [[nodiscard]] static Ocam fromParams(const std::array<double, 14>& p) {
+    Ocam m;
+    std::copy_n(p.begin(), m.a.size(), m.a.begin());
+    m.cx = p[9];
+    m.cy = p[10];
+    m.c = p[11];
+    m.d = p[12];
+    m.e = p[13];
+    // rho f' - f, of which the field angle's slope is a positive multiple.
+    std::array<double, 9> slope{};
+    for (size_t i = 0; i < slope.size(); ++i) slope[i] = (static_cast<double>(i) - 1) * m.a[i];
+    const std::vector<double> turns = signChanges(slope, 0, 1e30);
+    if (!turns.empty()) {
+      m.max_rho = std::min(turns.front(), kUnbounded);
+      m.max_theta = std::atan2(turns.front(), m.forward(turns.front()).value);
+    } else {
+      // The leading coefficient beyond a1, if there is one, is positive here.
+      const bool line = std::all_of(m.a.begin() + 2, m.a.end(), [](double x) { return x == 0; });
+      m.max_theta = line ? std::atan2(1.0, -m.a[1]) : M_PI;
+    }
+    return m;
+  }
+  [[nodiscard]] std::array<double, 14> params() const {
+    return {a[0], a[1], a[2], a[3], a[4], a[5], a[6], a[7], a[8], cx, cy, c, d, e};
+  }
+  bool operator==(const Ocam&) const = default;
+
+  /// -f(rho), the component of the ray along the optical axis, and its slope.
+  template <class T>
+  [[nodiscard]] ValueAndSlope<T> forward(T rho) const {
+    T value = T(-a[8]), slope = T(0);
+    for (size_t i = 8; i-- > 0;) {
+      slope = slope * rho + value;
+      value = value * rho - T(a[i]);
+    }
+    return {value, slope};
+  }
+
+  template <class T>
+  [[nodiscard]] Pixel<T> project(T x, T y, T z) const {
+    const T r2 = x * x + y * y;
+    const T r = std::sqrt(r2);
+    const auto [rho, found] = sensorRadius(r, z);
+    const T scale = r > T(0) ? rho / r : T(-a[0]) / z;
+    const T px = x * scale, py = y * scale;
+    const T u = px + T(e) * py + T(cx);
+    const T v = T(d) * px + T(c) * py + T(cy);
+    return {u, v, found && norm2InRange(r2 + z * z) && pixelInRange(u, v)};
+  }
+
+  template <class T>
+  [[nodiscard]] Ray<T> unproject(T u, T v) const {
+    using W = Wider<T>;
+    const W du = static_cast<W>(u) - W(cx), dv = static_cast<W>(v) - W(cy);
+    const W determinant = W(c) - W(d) * W(e);
+    const W px = (W(c) * du - W(e) * dv) / determinant;
+    const W py = (dv - W(d) * du) / determinant;
+    const W rho = std::sqrt(px * px + py * py);
+    const W pz = forward(rho).value;
+    const W scale = 1 / std::sqrt(rho * rho + pz * pz);
+    return {static_cast<T>(px * scale),
+            static_cast<T>(py * scale),
+            static_cast<T>(pz * scale),
+            rho < W(max_rho) && pixelInRange(u, v)};
+  }
+
+  [[nodiscard]] ProjectionJacobian jacobian(double x, double y, double z) const {
+    const double r = std::sqrt(x * x + y * y);  // 0 where project takes its limit, too.
+    const double rho = sensorRadius(r, z).rho;
+    const auto [value, slope] = forward(rho);
+    // d rho / d theta, from tan(theta) = rho / forward(rho).
+    const double rise = (rho * rho + value * value) / (value - rho * slope) / (r * r + z * z);
+    const ProjectionJacobian plane =
+        radialJacobian(1, 1, x, y, r > 0 ? rho / r : -a[0] / z, rise * z, -rise * r);
+    Eigen::Matrix2d A;
+    A << 1, e, d, c;
+    return A * plane;
+  }
+
+  [[nodiscard]] double maxFieldAngle() const { return max_theta; }
+
+ private:
+  template <class T>
+  struct SensorRadius {
+    T rho;
+    bool found;
+  };
+
+  /// rho in [0, max_rho) of a ray's parts across and along the axis.
+  template <class T>
+  [[nodiscard]] SensorRadius<T> sensorRadius(T across, T along) const {
+    // |(rho, forward)| sin(field angle of rho - field angle of the ray): rises through zero once.
+    const auto mismatch = [&](auto rho) {
+      using S = decltype(rho);
+      const auto [value, slope] = forward(rho);
+      return ValueAndSlope<S>{rho * S(along) - value * S(across), S(along) - slope * S(across)};
+    };
+    const T hi = T(max_rho);
+    const bool found = mismatch(hi).value > T(0);
+    const T start = T(-a[0]) * std::atan2(across, along);
+    const T rho = found ? bracketedRoot(mismatch, T(0), hi, start < hi / 2 ? start : hi / 2) : T(0);
+    const auto [value, slope] = mismatch(static_cast<Wider<T>>(rho));
+    const T polished = static_cast<T>(rho - value / slope);
+    return {std::abs(polished - rho) <= T(1e-4) * rho && polished < hi ? polished : rho, found};
+  }
+};
+static_assert(CameraModel<Ocam>);
+
+}  // namespace dlsd

@@ -1,0 +1,126 @@
+#pragma once
+#include "cameras/camera_model.h"
+#include "cameras/radtan.h"
+
+namespace dlsd {
+
+/// Unified omnidirectional model with radial-tangential distortion (Mei and Rives, "Single view
+/// point omnidirectional camera calibration from planar grids", 2007), as OpenCV's `omnidir` and
+/// Kalibr's `omni` with `radtan` (skew = 0):
+///
+///   d = |(x, y, z)|,  (mx, my) = D((x, y) / (z + xi d)),  D as in radtan.h with k3 = 0
+///   u = fx mx + skew my + cx,  v = fy my + cy
+///
+/// Domain: that of UnifiedOmni and, in the plane of m, the disc of radius max_radius on which D is
+/// one-to-one and which ends at the fold of the sphere, 1 / sqrt(xi^2 - 1), for xi > 1. Pixels: the
+/// image of that disc.
+struct OmniRadtan {
+  static constexpr std::string_view kName = "omni_radtan";
+  static constexpr std::array<ParamSpec, 10> kParams{{
+      {"xi", "1", 0, 1e3, 0, 3},
+      {"fx", "px", 1e-3, 1e7, 100, 2000},
+      {"fy", "px", 1e-3, 1e7, 100, 2000},
+      {"cx", "px", -1e6, 1e6, 50, 2000},
+      {"cy", "px", -1e6, 1e6, 50, 2000},
+      {"k1", "1", -1e2, 1e2, -0.4, 0.4},
+      {"k2", "1", -1e4, 1e4, -0.2, 0.2},
+      {"p1", "1", -10, 10, -0.01, 0.01},
+      {"p2", "1", -10, 10, -0.01, 0.01},
+      {"skew", "px", -1e7, 1e7, -10, 10},
+  }};
+
+  double xi = 0, fx = 1, fy = 1, cx = 0, cy = 0;
+  Radtan radtan;
+  double skew = 0;
+  double max_radius = Radtan::kUnbounded;  ///< Derived: the smaller of both bounds.
+  double max_theta = M_PI / 2;             ///< Derived: field angle there, rad.
+
+  [[nodiscard]] static OmniRadtan fromParams(const std::array<double, 10>& p) {
+    OmniRadtan m{p[0], p[1], p[2], p[3], p[4], Radtan::make(p[5], p[6], p[7], p[8], 0), p[9]};
+    const double sine2 = std::abs((m.xi - 1) * (m.xi + 1));
+    const double fold = m.xi > 1 ? 1 / std::sqrt(sine2) : Radtan::kUnbounded;
+    if (fold <= m.radtan.max_radius) {
+      m.max_radius = fold;
+      m.max_theta = std::atan2(std::sqrt(sine2), m.xi > 1 ? -1 : -m.xi);
+    } else {
+      m.max_radius = m.radtan.max_radius;
+      const auto ray = m.liftToSphere(m.max_radius, 0.0);
+      m.max_theta = std::atan2(ray.x, ray.z);
+    }
+    return m;
+  }
+  [[nodiscard]] std::array<double, 10> params() const {
+    return {xi, fx, fy, cx, cy, radtan.k1, radtan.k2, radtan.p1, radtan.p2, skew};
+  }
+  bool operator==(const OmniRadtan&) const = default;
+
+  template <class T>
+  [[nodiscard]] Pixel<T> project(T x, T y, T z) const {
+    // Wider: the distortion multiplies relative errors of the plane's point, up to fivefold, where
+    // at the fold of the sphere the ray's own resolution does not excuse them.
+    using W = Wider<T>;
+    const W r2 = W(x) * x + W(y) * y;
+    const W norm2 = r2 + W(z) * z;
+    const W denom = denominator(r2, W(z), std::sqrt(norm2));
+    const W nx = x / denom, ny = y / denom;
+    const auto [mx, my] = radtan.distort(nx, ny);
+    const T u = static_cast<T>(W(fx) * mx + W(skew) * my + W(cx));
+    const T v = static_cast<T>(W(fy) * my + W(cy));
+    const bool before_fold = z >= T(0) || xi <= 1 || r2 > W((xi - 1) * (xi + 1)) * (W(z) * z);
+    const bool in_disc = denom > W(0) && std::sqrt(nx * nx + ny * ny) < W(radtan.max_radius);
+    return {
+        u, v, before_fold && in_disc && norm2InRange(static_cast<T>(norm2)) && pixelInRange(u, v)};
+  }
+
+  template <class T>
+  [[nodiscard]] Ray<T> unproject(T u, T v) const {
+    using W = Wider<T>;
+    const W my = (W(v) - W(cy)) / W(fy);
+    const W mx = (W(u) - W(cx) - W(skew) * my) / W(fx);
+    const auto [x, y, valid] = radtan.undistort<T>(mx, my, max_radius);
+    const auto ray = liftToSphere(x, y);
+    return {static_cast<T>(ray.x),
+            static_cast<T>(ray.y),
+            static_cast<T>(ray.z),
+            valid && pixelInRange(u, v)};
+  }
+
+  [[nodiscard]] ProjectionJacobian jacobian(double x, double y, double z) const {
+    const double r2 = x * x + y * y;
+    const double d = std::sqrt(r2 + z * z);
+    const double denom = denominator(r2, z, d);
+    const double slope = z >= 0 ? d + xi * z : (r2 - (xi - 1) * (xi + 1) * z * z) / (d - xi * z);
+    const double g = slope / (d * denom * denom);
+    const ProjectionJacobian plane =
+        radialJacobian(1, 1, x, y, 1 / denom, z * g, -std::sqrt(r2) * g);
+    Eigen::Matrix2d A;
+    A << fx, skew, 0, fy;
+    const ProjectionJacobian J = A * (radtan.jacobian(x / denom, y / denom) * plane);
+    // Euler: J ray = 0, which the product keeps only to rounding of its largest factor.
+    const Eigen::RowVector3d ray(x, y, z);
+    return J - (J * ray.transpose()) * (ray / (d * d));
+  }
+
+  [[nodiscard]] double maxFieldAngle() const { return max_theta; }
+
+ private:
+  /// z + xi d, behind the camera without cancellation (UnifiedOmni).
+  template <class T>
+  [[nodiscard]] T denominator(T r2, T z, T d) const {
+    return z >= T(0) ? z + T(xi) * d
+                     : (T(xi * xi) * r2 + T((xi - 1) * (xi + 1)) * (z * z)) / (T(xi) * d - z);
+  }
+
+  /// The unit ray of an undistorted point of the plane, up to the fold.
+  template <class T>
+  [[nodiscard]] Ray<T> liftToSphere(T x, T y) const {
+    const T m2 = x * x + y * y;
+    const T disc = T(1) + T((1 - xi) * (1 + xi)) * m2;
+    const T root = std::sqrt(disc > T(0) ? disc : T(0));
+    const T scale = (T(xi) + root) / (T(1) + m2);
+    return {x * scale, y * scale, (root - T(xi) * m2) / (T(1) + m2), true};
+  }
+};
+static_assert(CameraModel<OmniRadtan>);
+
+}  // namespace dlsd
