@@ -87,10 +87,10 @@ std::string plusHalf(std::string_view decimal, int sign) {
   long exponent = 0;
   if (const size_t e = decimal.find_first_of("eE"); e != std::string_view::npos) {
     const std::string_view power = decimal.substr(decimal[e + 1] == '+' ? e + 2 : e + 1);
-    const auto result = std::from_chars(power.data(), power.data() + power.size(), exponent);
-    // Among numbers of limited length, zero alone is finite with such a power.
-    if (result.ec != std::errc() || std::abs(exponent) > 100'000) exponent = 0;
     decimal = decimal.substr(0, e);
+    // The power of a zero may be anything, that of other doubles is small.
+    const bool zero = decimal.find_first_not_of("0.") == std::string_view::npos;
+    if (!zero) (void)std::from_chars(power.data(), power.data() + power.size(), exponent);
   }
   const size_t dot = std::min(decimal.find('.'), decimal.size());
   Decimal a{std::string(decimal.substr(0, dot)), static_cast<long>(dot) + exponent};
