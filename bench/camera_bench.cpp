@@ -170,6 +170,62 @@ Point3 referenceUnproject(const DoubleSphere& m, double u, double v) {
   return {k * mx, k * my, k * mz - m.xi};
 }
 
+Point2 referenceProject(const OmniRadtan& m, double x, double y, double z) {
+  const double denominator = z + m.xi * std::sqrt(x * x + y * y + z * z);
+  const auto [mx, my] = distort(m.radtan, x / denominator, y / denominator);
+  return {m.fx * mx + m.skew * my + m.cx, m.fy * my + m.cy};
+}
+Point3 referenceUnproject(const OmniRadtan& m, double u, double v) {
+  const double my = (v - m.cy) / m.fy;
+  const auto [x, y] = undistort(m.radtan, (u - m.cx - m.skew * my) / m.fx, my);
+  return liftToSphere(m.xi, x, y);
+}
+
+/// -f(rho) and its slope.
+std::pair<double, double> forward(const Ocam& m, double rho) {
+  double value = 0, slope = 0;
+  for (size_t i = m.a.size(); i-- > 0;) {
+    slope = slope * rho + value;
+    value = value * rho - m.a[i];
+  }
+  return {value, slope};
+}
+Point2 referenceProject(const Ocam& m, double x, double y, double z) {
+  const double r = std::sqrt(x * x + y * y);
+  if (r == 0) return {m.cx, m.cy};
+  const double rho = newton(-m.a[0] * std::atan2(r, z), [&](double a) {
+    const auto [value, slope] = forward(m, a);
+    return std::pair(a * z - value * r, z - slope * r);
+  });
+  const double px = x / r * rho, py = y / r * rho;
+  return {px + m.e * py + m.cx, m.d * px + m.c * py + m.cy};
+}
+Point3 referenceUnproject(const Ocam& m, double u, double v) {
+  const double determinant = m.c - m.d * m.e;
+  const double px = (m.c * (u - m.cx) - m.e * (v - m.cy)) / determinant;
+  const double py = (v - m.cy - m.d * (u - m.cx)) / determinant;
+  return unit(px, py, forward(m, std::sqrt(px * px + py * py)).first);
+}
+
+Point2 referenceProject(const ThetaPolynomial& m, double x, double y, double z) {
+  const double r = std::sqrt(x * x + y * y);
+  if (r == 0) return {m.cx, m.cy};
+  const double theta = std::atan2(r, z);
+  const double rho = theta * (m.k1 + theta * (m.k2 + theta * (m.k3 + theta * m.k4)));
+  return {rho * x / r + m.cx, m.aspect * rho * y / r + m.cy};
+}
+Point3 referenceUnproject(const ThetaPolynomial& m, double u, double v) {
+  const double mx = u - m.cx, my = (v - m.cy) / m.aspect;
+  const double rho = std::sqrt(mx * mx + my * my);
+  if (rho == 0) return {0, 0, 1};
+  const double theta = newton(rho / m.k1, [&](double a) {
+    return std::pair(a * (m.k1 + a * (m.k2 + a * (m.k3 + a * m.k4))) - rho,
+                     m.k1 + a * (2 * m.k2 + a * (3 * m.k3 + a * 4 * m.k4)));
+  });
+  const double s = std::sin(theta) / rho;
+  return {mx * s, my * s, std::cos(theta)};
+}
+
 // --- Cameras of about 1280 x 1024, each near one that exists ---
 
 Camera exampleCamera(std::string_view model) {
@@ -185,8 +241,12 @@ Camera exampleCamera(std::string_view model) {
       {"pinhole_radtan",
        {779.71, 777.40, 640.2, 512.3, -0.28340811, 0.07395907, 0.00019359, 1.76187e-05, 0}},
       {"eucm", {0.6, 1.1, 380, 380, 640, 512}},
-      // TUM-VI as in the paper, 2.5 times as large.
-      {"double_sphere", {-0.18, 0.59, 392.5, 392.5, 637.8, 512.5}},
+      {"omni_radtan", {1.4, 900, 899, 640, 512, -0.1, 0.02, 2e-4, -3e-4, 0}},
+      {"ocam", {-500, 0, 6e-4, -1e-7, 3e-10, 0, 0, 0, 0, 640, 512, 1.0003, 1e-4, -2e-4}},
+      // WoodScape, front view.
+      {"theta_polynomial", {339.749, -31.988, 48.275, -7.201, 1, 643.4, 515.8}},
+      // TUM-VI, 2.5 times as large.
+      {"double_sphere", {-0.17213, 0.59302, 395.7, 395.7, 637.8, 512.4}},
   };
   return makeCamera(model, params.at(model), kWidth, kHeight);
 }

@@ -50,7 +50,7 @@ TEST(Allocation, NoneInBatches) {
     ++models;
     for (const double limit : {1.5, M_PI}) {
       const Camera camera(model, 640, 480, limit);
-      for (const size_t n : {1, 1000, 5000}) {
+      for (const size_t n : {size_t{1}, size_t{1000}, size_t{5000}}) {
         expectNoAllocation<double>(camera, n);
         expectNoAllocation<float>(camera, n);
       }

@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "cameras/batch.h"
+#include "cameras/calibration/files.h"
 #include "properties/gen.h"
 #include "properties/oracle.h"
 
@@ -40,8 +41,12 @@ constexpr Budget kBudgets[] = {
     {"kannala_brandt", 3e-12, 3e-12, 2e-3, 2e-3},
     {"omni", 3e-12, 2e-12, 1.5e-3, 1e-3},
     {"pinhole_radtan", 4e-12, 2e-12, 3e-3, 1e-3},
+    {"omni_radtan", 4e-12, 2e-12, 3e-3, 1e-3},
+    {"ocam", 4e-12, 2e-12, 3e-3, 1e-3},
+    {"theta_polynomial", 4e-12, 2e-12, 3e-3, 1e-3},
     {"eucm", 3e-12, 2e-12, 2e-3, 1e-3},
     {"double_sphere", 4e-12, 3e-12, 3e-3, 2e-3},
+    {"equirectangular", 3e-12, 3e-12, 2e-3, 2e-3},
 };
 
 Budget budgetOf(std::string_view model) {
@@ -227,7 +232,7 @@ Range drawRange() {
 template <class Body>
 void forLengths(const Body& body) {
   for (size_t n = 0; n <= 3 * 64 + 1; ++n) body(n);
-  for (const size_t n : {511, 512, 513, 1023, 1024, 1025}) body(n);
+  for (const size_t n : std::initializer_list<size_t>{511, 512, 513, 1023, 1024, 1025}) body(n);
 }
 
 /// The value of a generator for a seed.
@@ -428,6 +433,16 @@ void budgetsAreKept(bool single) {
             << unproject.value << " px\n";
   EXPECT_GT(project.count, 1000);
   EXPECT_GT(unproject.count, 1000);
+}
+
+TYPED_TEST(BatchSuite, TheDocumentedBudgetsAreThese) {
+  const Budget budget = budgetOf(TypeParam::kName);
+  std::ostringstream row;
+  row << "| " << budget.model << " | " << budget.project_px << " | " << budget.unproject_px << " | "
+      << budget.float_project_px << " | " << budget.float_unproject_px << " |";
+  const std::string docs = readFile(std::string(DLSD_SOURCE_DIR) + "/docs/cameras.md");
+  EXPECT_NE(docs.find(row.str()), std::string::npos) << "docs/cameras.md lacks the row\n"
+                                                     << row.str();
 }
 
 TYPED_TEST(BatchSuite, DoublesKeepTheirBudget) {
