@@ -672,8 +672,14 @@ TEST(Hostile, TextsAreRefusedInTime) {
   EXPECT_THAT(refusal(bomb), HasSubstr("anchor or alias"));
   EXPECT_THAT(refusal("\x89PNG\r\n\x1a\n"), HasSubstr("not a text file in UTF-8: byte 1 is 137"));
   EXPECT_THAT(refusal(std::string("c\0a\0m\0", 6)), HasSubstr("byte 2 is 0"));
-  for (const std::string bad :
-       {"\xc0\x80", "\xed\xa0\x80", "\xf4\x90\x80\x80", "\xe2\x82", "\x80", "\xff"}) {
+  for (const std::string bad : {"\xc0\x80",
+                                "\xe0\x80\x80",
+                                "\xf0\x80\x80\x80",
+                                "\xed\xa0\x80",
+                                "\xf4\x90\x80\x80",
+                                "\xe2\x82",
+                                "\x80",
+                                "\xff"}) {
     EXPECT_THAT(refusal("cam0: " + bad + "\n"), HasSubstr("byte 7 is"));
   }
   EXPECT_THAT(refusal("cam0: {\"\xc3\xa4\xe2\x82\xac\xf0\x9f\x98\x80\": 1}\n"),

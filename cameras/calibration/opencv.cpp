@@ -193,8 +193,12 @@ CameraMatrix cameraMatrix(const Field& field) {
           m.values[1].number({-1e7, 1e7, "px"})};
 }
 
+constexpr std::array<size_t, 1> kOne{1};
+constexpr std::array<size_t, 1> kFour{4};
+constexpr std::array<size_t, 6> kPinholeCounts{0, 4, 5, 8, 12, 14};
+
 /// The numbers of a row or column. `counts`: how many there may be.
-std::vector<Field> vectorOf(const Field& field, std::initializer_list<size_t> counts) {
+std::vector<Field> vectorOf(const Field& field, std::span<const size_t> counts) {
   const Matrix m = matrix(field);
   const bool right_shape = m.rows <= 1 || m.cols <= 1;
   if (!right_shape || std::find(counts.begin(), counts.end(), m.values.size()) == counts.end()) {
@@ -225,12 +229,28 @@ std::array<double, 5> radtanCoefficients(const std::vector<Field>& values) {
   return k;
 }
 
-std::array<double, 4> fisheyeCoefficients(const std::vector<Field>& values) {
-  std::array<double, 4> k{};
-  for (size_t i = 0; i < k.size(); ++i) {
-    k[i] = values[i].number(allowedBy(paramSpecsOf("kannala_brandt")[4 + i]));
+/// Coefficients as parameters of a model from `first` on.
+std::vector<double> coefficients(const std::vector<Field>& values,
+                                 std::string_view model,
+                                 size_t first) {
+  std::vector<double> k;
+  k.reserve(values.size());
+  for (size_t i = 0; i < values.size(); ++i) {
+    k.push_back(values[i].number(allowedBy(paramSpecsOf(model)[first + i])));
   }
   return k;
+}
+
+Camera fisheyeCamera(const Field& root,
+                     const CameraMatrix& K,
+                     const Field& distortion,
+                     std::pair<int, int> size,
+                     double max_field_angle_rad) {
+  std::vector<double> params(K.fx_fy_cx_cy.begin(), K.fx_fy_cx_cy.end());
+  for (const double k : coefficients(vectorOf(distortion, kFour), "kannala_brandt", 4)) {
+    params.push_back(k);
+  }
+  return root.camera("kannala_brandt", params, size, max_field_angle_rad);
 }
 
 void refuseSkew(const Field& field, double skew) {
@@ -255,10 +275,10 @@ std::pair<int, int> imageSize(const Field& root) {
   return {width->imageSize(), height->imageSize()};
 }
 
-Loaded readStorage(const Document& document, Lens lens) {
-  const Field root = document.field();
-  std::vector<std::string_view> allowed;
-  for (const Names names : {Names(kDistortion),
+void refuseUnknownStorageKeys(const Field& root) {
+  std::vector<std::string_view> known;
+  for (const Names names : {Names(kCameraMatrix),
+                            Names(kDistortion),
                             Names(kXi),
                             Names(kWidth),
                             Names(kHeight),
@@ -266,85 +286,78 @@ Loaded readStorage(const Document& document, Lens lens) {
                             Names(kFisheyeModel),
                             Names(kMaxFieldAngle),
                             Names(kIgnored)}) {
-    allowed.insert(allowed.end(), names.begin(), names.end());
+    known.insert(known.end(), names.begin(), names.end());
   }
-  if (root.node().isMap()) {
-    for (const std::string& key : root.node().keys) {
-      if (std::find(allowed.begin(), allowed.end(), key) == allowed.end() &&
-          std::find(kCameraMatrix.begin(), kCameraMatrix.end(), key) == kCameraMatrix.end()) {
-        root.fail("has the unknown key " + inQuotes(key) +
-                  ", please remove it if it says nothing about the lens");
-      }
+  for (const std::string& key : root.node().keys) {
+    if (std::find(known.begin(), known.end(), key) == known.end()) {
+      root.fail("has the unknown key " + inQuotes(key) +
+                ", please remove it if it says nothing about the lens");
     }
   }
+}
+
+/// The model of a file: what was asked for, what it says by a word, or what its number of
+/// coefficients says where that is no other model's.
+Lens lensOf(const Field& root, Lens asked_for, const Field& distortion) {
+  constexpr std::array<std::string_view, 4> kWords{"0", "1", "false", "true"};
+  const std::optional<Field> xi = findOne(root, kXi);
+  const std::optional<Field> fisheye = findOne(root, kFisheyeModel);
+  Lens said = Lens::kUnknown;
+  if (fisheye) said = fisheye->oneOf(kWords) % 2 == 1 ? Lens::kFisheye : Lens::kPinhole;
+  if (xi && said == Lens::kFisheye) {
+    root.fail("has both xi and fisheye_model: 1, allowed is one of them");
+  }
+  if (xi) said = Lens::kOmnidir;
+  if (said == Lens::kUnknown) said = asked_for;
+  if (asked_for != Lens::kUnknown && asked_for != said) {
+    root.fail("says by " + (xi ? xi : fisheye)->place() +
+              " that it is another model than the one asked for");
+  }
+  if (asked_for == Lens::kOmnidir && !xi) root.fail("has no xi, which cv::omnidir needs");
+  if (said != Lens::kUnknown) return said;
+  if (vectorOf(distortion, kPinholeCounts).size() == 4) {
+    distortion.fail(
+        "has 4 coefficients, which is cv::fisheye (k1, k2, k3, k4) or the pinhole model (k1, k2, "
+        "p1, p2): please choose the format opencv-fisheye or opencv-pinhole, or add fisheye_model: "
+        "1 or 0");
+  }
+  return Lens::kPinhole;
+}
+
+Loaded readStorage(const Document& document, Lens asked_for) {
+  const Field root = document.field();
+  refuseUnknownStorageKeys(root);
   const std::optional<Field> matrix_field = findOne(root, kCameraMatrix);
+  const std::optional<Field> D = findOne(root, kDistortion);
+  const std::optional<Field> limit = findOne(root, kMaxFieldAngle);
   if (!matrix_field) root.fail("has no camera matrix: camera_matrix (or K) is missing");
-  const CameraMatrix K = cameraMatrix(*matrix_field);
-  const std::pair<int, int> size = imageSize(root);
-  const std::optional<Field> D = findOne(root, kDistortion), xi = findOne(root, kXi),
-                             fisheye = findOne(root, kFisheyeModel),
-                             limit = findOne(root, kMaxFieldAngle);
-  const double max_field_angle = limit ? limit->maxFieldAngle() : M_PI;
   if (!D) {
     root.fail(
         "has no distortion coefficients: distortion_coefficients (or D) is missing, which is zeros "
         "for a lens without distortion");
   }
-
-  Lens said = Lens::kUnknown;
-  if (fisheye) {
-    constexpr std::array<std::string_view, 4> kWords{"0", "1", "false", "true"};
-    said = fisheye->oneOf(kWords) % 2 == 1 ? Lens::kFisheye : Lens::kPinhole;
+  const CameraMatrix K = cameraMatrix(*matrix_field);
+  const std::pair<int, int> size = imageSize(root);
+  const double max_field_angle = limit ? limit->maxFieldAngle() : M_PI;
+  const Lens lens = lensOf(root, asked_for, *D);
+  if (lens == Lens::kOmnidir) {
+    const Field xi = findOne(root, kXi).value();
+    std::vector<double> params{(xi.node().isScalar() ? xi : vectorOf(xi, kOne).front())
+                                   .number(allowedBy(specOf("omni", "xi")))};
+    params.insert(params.end(), K.fx_fy_cx_cy.begin(), K.fx_fy_cx_cy.end());
+    std::vector<double> distortion =
+        coefficients(vectorOf(*D, kFour), "omni_radtan", params.size());
+    distortion.push_back(K.skew);
+    return {{{"cam0", root.omniOrRadtan(params, distortion, size, max_field_angle)}}};
   }
-  if (xi) {
-    if (said == Lens::kFisheye)
-      root.fail("has both xi and fisheye_model: 1, allowed is one of them");
-    said = Lens::kOmnidir;
-  }
-  if (lens != Lens::kUnknown && said != Lens::kUnknown && lens != said) {
-    root.fail("says by " + (xi ? xi : fisheye)->place() +
-              " that it is another model than the one asked for");
-  }
-  if (lens == Lens::kUnknown) lens = said;
-  if (lens == Lens::kUnknown) {
-    // Without a word, the number of coefficients decides, unless it is that of both models.
-    if (vectorOf(*D, {0, 4, 5, 8, 12, 14}).size() == 4) {
-      D->fail(
-          "has 4 coefficients, which is cv::fisheye (k1, k2, k3, k4) or the pinhole model (k1, k2, "
-          "p1, p2): "
-          "please choose the format opencv-fisheye or opencv-pinhole, or add fisheye_model: 1 or "
-          "0");
-    }
-    lens = Lens::kPinhole;
-  }
-
-  const auto camera = [&]() -> Camera {
-    if (lens == Lens::kFisheye) {
-      refuseSkew(*matrix_field, K.skew);
-      const std::array<double, 4> k = fisheyeCoefficients(vectorOf(*D, {4}));
-      std::vector<double> params(K.fx_fy_cx_cy.begin(), K.fx_fy_cx_cy.end());
-      params.insert(params.end(), k.begin(), k.end());
-      return root.camera("kannala_brandt", params, size, max_field_angle);
-    }
-    if (lens == Lens::kOmnidir) {
-      if (!xi) root.fail("has no xi, which cv::omnidir needs");
-      std::vector<double> params{(xi->node().isScalar() ? *xi : vectorOf(*xi, {1}).front())
-                                     .number(allowedBy(specOf("omni", "xi")))};
-      params.insert(params.end(), K.fx_fy_cx_cy.begin(), K.fx_fy_cx_cy.end());
-      std::vector<double> distortion;
-      const std::vector<Field> values = vectorOf(*D, {4});
-      for (size_t i = 0; i < values.size(); ++i) {
-        distortion.push_back(values[i].number(allowedBy(paramSpecsOf("omni_radtan")[5 + i])));
-      }
-      distortion.push_back(K.skew);
-      return root.omniOrRadtan(params, distortion, size, max_field_angle);
-    }
-    refuseSkew(*matrix_field, K.skew);
-    const std::array<double, 5> k =
-        D ? radtanCoefficients(vectorOf(*D, {0, 4, 5, 8, 12, 14})) : std::array<double, 5>{};
-    return root.pinholeOrRadtan(K.fx_fy_cx_cy, k, size, max_field_angle);
-  };
-  return {{{"cam0", camera()}}};
+  refuseSkew(*matrix_field, K.skew);
+  return {{{"cam0",
+            lens == Lens::kFisheye
+                ? fisheyeCamera(root, K, *D, size, max_field_angle)
+                : root.pinholeOrRadtan(K.fx_fy_cx_cy,
+                                       radtanCoefficients(vectorOf(*D, kPinholeCounts)),
+                                       size,
+                                       max_field_angle)}}};
 }
 
 std::string matrixText(std::string_view key,
@@ -489,14 +502,15 @@ Loaded readRos(const Document& document) {
   const size_t model = root.at("distortion_model").oneOf(kRosModels);
   const Field D = root.at("distortion_coefficients");
   if (kRosModels[model] == "equidistant") {
-    const std::array<double, 4> k = fisheyeCoefficients(vectorOf(D, {4}));
-    std::vector<double> params(K.fx_fy_cx_cy.begin(), K.fx_fy_cx_cy.end());
-    params.insert(params.end(), k.begin(), k.end());
-    return {{{"cam0", root.camera("kannala_brandt", params, size, max_field_angle)}}};
+    return {{{"cam0", fisheyeCamera(root, K, D, size, max_field_angle)}}};
   }
-  const std::array<double, 5> k = radtanCoefficients(
-      kRosModels[model] == "plumb_bob" ? vectorOf(D, {0, 4, 5}) : vectorOf(D, {8}));
-  return {{{"cam0", root.pinholeOrRadtan(K.fx_fy_cx_cy, k, size, max_field_angle)}}};
+  constexpr std::array<size_t, 3> kPlumbBob{0, 4, 5};
+  constexpr std::array<size_t, 1> kRational{8};
+  const std::vector<Field> values =
+      kRosModels[model] == "plumb_bob" ? vectorOf(D, kPlumbBob) : vectorOf(D, kRational);
+  return {
+      {{"cam0",
+        root.pinholeOrRadtan(K.fx_fy_cx_cy, radtanCoefficients(values), size, max_field_angle)}}};
 }
 
 std::string writeRos(const std::vector<NamedCamera>& cameras) {
