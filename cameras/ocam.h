@@ -1,6 +1,7 @@
 #pragma once
 #include <algorithm>
 #include <array>
+#include <type_traits>
 
 #include "cameras/camera_model.h"
 #include "cameras/newton.h"
@@ -89,14 +90,16 @@ struct Ocam {
 
   template <class T>
   [[nodiscard]] Pixel<T> project(T x, T y, T z) const {
-    const T r2 = x * x + y * y;
-    const T r = std::sqrt(r2);
-    const auto [rho, found] = sensorRadius(r, z);
+    using W = Wider<T>;
+    const W r2 = W(x) * W(x) + W(y) * W(y);
+    const W across = std::sqrt(r2);
+    const T r = static_cast<T>(across);
+    const auto [rho, found] = sensorRadius<T>(across, z);
     const T scale = r > T(0) ? rho / r : T(-a[0]) / z;
     const T px = x * scale, py = y * scale;
     const T u = px + T(e) * py + T(cx);
     const T v = T(d) * px + T(c) * py + T(cy);
-    return {u, v, found && norm2InRange(r2 + z * z) && pixelInRange(u, v)};
+    return {u, v, found && norm2InRange(static_cast<T>(r2) + z * z) && pixelInRange(u, v)};
   }
 
   template <class T>
@@ -117,7 +120,7 @@ struct Ocam {
 
   [[nodiscard]] ProjectionJacobian jacobian(double x, double y, double z) const {
     const double r = std::sqrt(x * x + y * y);  // 0 where project takes its limit, too.
-    const double rho = sensorRadius(r, z).rho;
+    const double rho = sensorRadius<double>(r, z).rho;
     const auto [value, slope] = forward(rho);
     // d rho / d theta, from tan(theta) = rho / forward(rho).
     const double rise = (rho * rho + value * value) / (value - rho * slope) / (r * r + z * z);
@@ -139,20 +142,28 @@ struct Ocam {
 
   /// rho in [0, max_rho) of a ray's parts across and along the axis.
   template <class T>
-  [[nodiscard]] SensorRadius<T> sensorRadius(T across, T along) const {
+  [[nodiscard]] SensorRadius<T> sensorRadius(Wider<T> across, T along) const {
     // |(rho, forward)| sin(field angle of rho - field angle of the ray): rises through zero once.
     const auto mismatch = [&](auto rho) {
       using S = decltype(rho);
       const auto [value, slope] = forward(rho);
-      return ValueAndSlope<S>{rho * S(along) - value * S(across), S(along) - slope * S(across)};
+      const S x = static_cast<S>(across), z = static_cast<S>(along);
+      return ValueAndSlope<S>{rho * z - value * x, z - slope * x};
     };
-    const T hi = T(max_rho);
-    const bool found = mismatch(hi).value > T(0);
-    const T start = T(-a[0]) * std::atan2(across, along);
+    const T hi = static_cast<T>(max_rho);
+    // At the end, powers overflow a float.
+    const bool found = mismatch(static_cast<std::common_type_t<T, double>>(max_rho)).value > 0;
+    const T start = T(-a[0]) * std::atan2(static_cast<T>(across), along);
     const T rho = found ? bracketedRoot(mismatch, T(0), hi, start < hi / 2 ? start : hi / 2) : T(0);
-    const auto [value, slope] = mismatch(static_cast<Wider<T>>(rho));
-    const T polished = static_cast<T>(rho - value / slope);
-    return {std::abs(polished - rho) <= T(1e-4) * rho && polished < hi ? polished : rho, found};
+    // What rounding leaves; near the end of the domain, where the field angle is flat, that is
+    // much.
+    Wider<T> polished = rho;
+    for (int i = 0; i < 3; ++i) {
+      const auto [value, slope] = mismatch(polished);
+      polished -= value / slope;
+    }
+    const T answer = static_cast<T>(polished);
+    return {std::abs(answer - rho) <= T(1e-4) * rho && answer < hi ? answer : rho, found};
   }
 };
 static_assert(CameraModel<Ocam>);
