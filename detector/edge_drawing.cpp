@@ -8,13 +8,11 @@
 
 namespace dlsd {
 
-EdgeThresholds edgeThresholds(const EdgeDrawingOptions& options, double noise) {
-  const auto units = [&](double gradient, double noise_ratio) {
-    const double bound = std::max(gradient, noise_ratio * noise) * kGradientUnit;
-    return static_cast<uint16_t>(std::clamp(bound, 1.0, 65535.0));
+EdgeThresholds edgeThresholds(const EdgeDrawingOptions& options) {
+  const auto units = [&](double gradient) {
+    return static_cast<uint16_t>(std::clamp(gradient * kGradientUnit, 1.0, 65535.0));
   };
-  return {units(options.anchor_gradient, options.anchor_noise_ratio),
-          units(options.min_gradient, options.min_noise_ratio)};
+  return {units(options.anchor_gradient), units(options.min_gradient)};
 }
 
 EdgeDrawer::EdgeDrawer(int width, int height, const EdgeDrawingOptions& options)
@@ -148,19 +146,6 @@ void EdgeDrawer::link(const GradientField& field,
       chains->starts.push_back(static_cast<uint32_t>(pixels.size()));
     }
   }
-}
-
-CrestOffset crestOffset(const GradientField& field, int x, int y) {
-  const size_t i = field.at(x, y);
-  const double gx = field.gx[i], gy = field.gy[i];
-  const bool along_x = std::abs(gx) >= std::abs(gy);
-  const size_t stride = along_x ? 1 : static_cast<size_t>(field.width);
-  const auto component = [&](size_t k) { return field.gx[k] * gx + field.gy[k] * gy; };
-  const double before = component(i - stride), here = component(i), after = component(i + stride);
-  const double curvature = before - 2 * here + after;
-  if (!(curvature < 0)) return {0, 0};
-  const double offset = std::clamp(0.5 * (before - after) / curvature, -1.0, 1.0);
-  return along_x ? CrestOffset{offset, 0} : CrestOffset{0, offset};
 }
 
 }  // namespace dlsd

@@ -30,7 +30,7 @@ struct EdgeThresholds {
   uint16_t anchor = 0, chain = 1;  ///< chain >= 1, so that masked pixels (0) never pass.
 };
 
-[[nodiscard]] EdgeThresholds edgeThresholds(const EdgeDrawingOptions& options, double noise);
+[[nodiscard]] EdgeThresholds edgeThresholds(const EdgeDrawingOptions& options);
 
 class EdgeDrawer {
  public:
@@ -61,14 +61,5 @@ class EdgeDrawer {
   std::vector<uint32_t> anchors_;  // pixel indices
   std::vector<uint8_t> visited_;   // one byte per pixel
 };
-
-/// Offset from pixel (x, y) to the crest of the gradient, along x if |gx| >= |gy|, else along y:
-/// the vertex of the parabola through the gradient's component along its direction at (x, y), there
-/// and at the two neighbours. In [-1, 1]; 0 where the three values have no maximum. Error for a
-/// blurred step: below 0.03 px at any phase, 0 on average over phases.
-struct CrestOffset {
-  double dx, dy;
-};
-[[nodiscard]] CrestOffset crestOffset(const GradientField& field, int x, int y);
 
 }  // namespace dlsd

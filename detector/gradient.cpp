@@ -4,6 +4,8 @@
 #include <array>
 #include <cmath>
 
+#include "detector/grey_rows.h"
+
 namespace dlsd {
 namespace {
 
@@ -11,48 +13,6 @@ namespace {
 // back to 16 bits (all fit) because C++ would widen it to 32 and halve the speed.
 using U = uint16_t;
 using I = int16_t;
-
-constexpr int kGreyMax = 255 * 16;  // fixed point of 1/16 grey level
-
-template <class T>
-U toFixed(T value) {
-  if constexpr (std::is_same_v<T, uint8_t>) {
-    return static_cast<U>(value << 4);
-  } else if constexpr (std::is_same_v<T, uint16_t>) {
-    return static_cast<U>((static_cast<uint32_t>(value) * kGreyMax + 32767) / 65535);
-  } else {
-    // The comparison is false for NaN.
-    const float v = value > 0.0F ? value : 0.0F;
-    return static_cast<U>((v < 255.0F ? v : 255.0F) * 16.0F + 0.5F);
-  }
-}
-
-template <class T>
-void loadGrey(const T* source, int width, U* row) {
-  for (int x = 0; x < width; ++x) row[x] = toFixed(source[x]);
-}
-
-template <class T>
-void loadColour(const T* source, int width, int channels, bool bgr, U* row) {
-  // Luma weights of BT.601 in 1/256.
-  const uint32_t w0 = bgr ? 29 : 77, w2 = bgr ? 77 : 29;
-  for (int x = 0; x < width; ++x, source += channels) {
-    const uint32_t sum =
-        w0 * toFixed(source[0]) + 150U * toFixed(source[1]) + w2 * toFixed(source[2]);
-    row[x] = static_cast<U>((sum + 128) >> 8);
-  }
-}
-
-template <class T>
-void loadTyped(const ImageView& image, int y, U* row) {
-  const auto* source =
-      reinterpret_cast<const T*>(static_cast<const uint8_t*>(image.data) + y * image.stride_bytes);
-  if (image.channels == 1) {
-    loadGrey(source, image.width, row);
-  } else {
-    loadColour(source, image.width, image.channels, image.bgr, row);
-  }
-}
 
 void smoothAlong(const U* __restrict padded, int width, U* __restrict out) {
   for (int x = 0; x < width; ++x) {
@@ -81,7 +41,6 @@ void smoothAcross(const std::array<const U*, 5>& rows, int width, I* __restrict 
 void gradientRow(const I* __restrict above,
                  const I* __restrict row,
                  const I* __restrict below,
-                 const U* __restrict usable,
                  int width,
                  I* __restrict gx,
                  I* __restrict gy,
@@ -100,32 +59,20 @@ void gradientRow(const I* __restrict above,
     const I larger = std::max(ax, ay);
     const I smaller = std::min(ax, ay);
     const I sum = static_cast<I>(larger + (smaller >> 2) + (smaller >> 3));
-    magnitude[x] = static_cast<U>(static_cast<U>(sum) & usable[x]);
+    magnitude[x] = static_cast<U>(sum);
   }
 }
 
 }  // namespace
 
-GradientFilter::GradientFilter(int width, int height, std::vector<uint16_t> usable)
+GradientFilter::GradientFilter(int width, int height)
     : width_(width),
       height_(height),
-      usable_(std::move(usable)),
       grey_row_(static_cast<size_t>(width) + 4),
       smooth_x_(5 * static_cast<size_t>(width)),
       smooth_(3 * (static_cast<size_t>(width) + 2)) {}
 
-void GradientFilter::loadRow(const ImageView& image, int y, uint16_t* row) const {
-  switch (image.type) {
-    case PixelType::kU8:
-      return loadTyped<uint8_t>(image, y, row);
-    case PixelType::kU16:
-      return loadTyped<uint16_t>(image, y, row);
-    case PixelType::kF32:
-      return loadTyped<float>(image, y, row);
-  }
-}
-
-void GradientFilter::compute(const ImageView& image, GradientField* field) {
+void GradientFilter::compute(const ImageView& image, const BitRows& usable, GradientField* field) {
   const size_t w = static_cast<size_t>(width_);
   const size_t count = w * static_cast<size_t>(height_);
   field->width = width_;
@@ -141,7 +88,7 @@ void GradientFilter::compute(const ImageView& image, GradientField* field) {
   for (int s = 0; s < height_ + 3; ++s) {
     if (s < height_) {
       U* grey = grey_row_.data();
-      loadRow(image, s, grey + 2);
+      loadGreyRow(image, s, grey + 2);
       grey[0] = grey[1] = grey[2];
       grey[w + 2] = grey[w + 3] = grey[w + 1];
       smoothAlong(grey, width_, smoothXRow(s));
@@ -163,41 +110,15 @@ void GradientFilter::compute(const ImageView& image, GradientField* field) {
       gradientRow(smoothRow(std::max(g - 1, 0)),
                   smoothRow(g),
                   smoothRow(std::min(g + 1, height_ - 1)),
-                  &usable_[offset],
                   width_,
                   &field->gx[offset],
                   &field->gy[offset],
                   &field->magnitude[offset]);
+      for (int x = 0; x < width_; ++x) {
+        if (!usable.test(x, g)) field->magnitude[offset + static_cast<size_t>(x)] = 0;
+      }
     }
   }
-}
-
-double GradientFilter::noise(const GradientField& field) const {
-  // Bins of 1/16 grey level per px; every third pixel of every third row is plenty.
-  constexpr int kShift = 3, kBins = (1 << 15) / (1 << kShift);
-  std::array<int, kBins> histogram{};
-  int total = 0;
-  for (int y = 0; y < height_; y += 3) {
-    for (int x = 0; x < width_; x += 3) {
-      const size_t i = field.at(x, y);
-      if (usable_[i] == 0) continue;
-      ++histogram[static_cast<size_t>(field.magnitude[i] >> kShift)];
-      ++total;
-    }
-  }
-  const double rank = 0.4 * total;
-  double below = 0;
-  for (size_t bin = 0; bin < histogram.size(); ++bin) {
-    const double here = histogram[bin];
-    if (below + here >= rank && here > 0) {
-      const double quantile = (static_cast<double>(bin) + (rank - below) / here) * (1 << kShift);
-      // 1.011 from the Rayleigh distribution; 1.040 is the mean excess of `magnitude` over the
-      // norm.
-      return quantile / (1.011 * 1.040 * kGradientUnit);
-    }
-    below += here;
-  }
-  return 0;
 }
 
 }  // namespace dlsd

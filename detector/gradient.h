@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "detector/image_view.h"
+#include "detector/usable_mask.h"
 
 namespace dlsd {
 
@@ -30,22 +31,14 @@ struct GradientField {
 /// is not a number counts as 0.
 class GradientFilter {
  public:
-  /// @param usable  width * height entries, 0 where no edge may be, else 0xffff.
-  GradientFilter(int width, int height, std::vector<uint16_t> usable);
+  GradientFilter(int width, int height);
 
-  /// The view must have the filter's size and be well formed (the detector checks it).
-  void compute(const ImageView& image, GradientField* field);
-
-  /// Standard deviation of one gradient component in the part of the image without edges, in grey
-  /// levels per px: from the 40 % quantile of the magnitude over usable pixels, which for Gaussian
-  /// noise is 1.01 standard deviations. White noise of s grey levels gives 0.136 s.
-  [[nodiscard]] double noise(const GradientField& field) const;
+  /// The view must have the filter's size and be well formed (the detector checks it). Magnitudes
+  /// are 0 where `usable` is not set.
+  void compute(const ImageView& image, const BitRows& usable, GradientField* field);
 
  private:
-  void loadRow(const ImageView& image, int y, uint16_t* row) const;
-
   int width_, height_;
-  std::vector<uint16_t> usable_;
   std::vector<uint16_t> grey_row_;  // 2 px of padding on each side
   std::vector<uint16_t> smooth_x_;  // ring of 5 rows
   std::vector<int16_t> smooth_;     // ring of 3 rows, 1 px of padding on each side

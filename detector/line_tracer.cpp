@@ -2,7 +2,6 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
-#include <array>
 #include <cmath>
 
 namespace dlsd {
@@ -10,316 +9,564 @@ namespace {
 
 /// A 3D line subtends less than pi; beyond this the tracer is going round a great circle.
 constexpr double kMaxAngleRad = 3.1;
-/// tan(pi / 8), the widest angle between gradient and curve normal at an edge.
-constexpr double kMaxTangent = 0.41421356237309503;
-/// Misses in a row that make a gap rather than a flaw.
-constexpr int kGapPx = 3;
+/// Rows that cross the curve, until it has turned this far beyond 45 degrees.
+constexpr double kTurnRatio = 1.25;
+/// Widest angle between an edge and the curve: tan(pi / 10).
+constexpr float kMaxTangent = 0.325F;
+/// Where four rows seen through the narrow filter scatter more than this, the wide one is used, if
+/// the edge stands alone: its neighbours would be seen, too.
+constexpr double kMaxNarrowSigmaPx = 0.2;
+constexpr double kAloneRatio[2] = {0.85, 1.25};
+/// Wide over narrow response: 1 for a step, 1.2 for one of blur 1.5 px, 1.3 for two alike that are
+/// 3 px apart, 1.7 for shading that rises evenly.
+constexpr float kMaxWideRatio = 1.45F;
+/// Standard deviations of noise that the response of an edge exceeds.
+constexpr float kEdgeSigmas = 2.5F;
+
+Eigen::Vector3d projected(const Eigen::Vector3d& ray, const Eigen::Vector3d& normal) {
+  return (ray - ray.dot(normal) * normal).normalized();
+}
 
 }  // namespace
 
 LineTracer::LineTracer(const RayTable& rays, const ValidationOptions& options)
     : rays_(rays), options_(options) {}
 
-/// Looks for a crest along the dominant axis of the curve's normal, through the row (or column) of
-/// pixels nearest to the position. False where the image or the usable part of it ends.
-bool LineTracer::evaluate(const GradientField& field,
-                          uint16_t min_magnitude,
-                          double bound_px,
-                          const Eigen::Vector2d& position,
-                          const CurveOffset& curve,
-                          Step* step) const {
-  const Eigen::Vector2d& e = curve.normal;
-  const bool along_x = std::abs(e.x()) >= std::abs(e.y());
-  const int axis = along_x ? 0 : 1;
-  // Where the curve, here a straight line, crosses that row.
-  const double row = std::floor(position[1 - axis] + 0.5);
-  const double crossing = position[axis] + (position[1 - axis] - row) * e[1 - axis] / e[axis];
-  const int centre = static_cast<int>(std::floor(crossing + 0.5));
-  const int x = along_x ? centre : static_cast<int>(row);
-  const int y = along_x ? static_cast<int>(row) : centre;
-  if (!rays_.isUsable(x, y)) return false;
+void LineTracer::setImage(const GreyPixels& pixels, const BitRows& usable, double min_contrast) {
+  pixels_ = pixels;
+  usable_ = &usable;
+  profiler_.setPixels(pixels);
+  measureNoise();
+  const auto floor = static_cast<float>(min_contrast);
+  min_odd_narrow_ = std::max(floor, kEdgeSigmas * noise_.odd_narrow);
+  min_odd_wide_ = std::max(floor, kEdgeSigmas * noise_.odd_wide);
+}
 
-  step->curve_px = position;
-  step->is_edge = false;
-  step->nx = static_cast<float>(e.x());
-  step->ny = static_cast<float>(e.y());
-  const size_t stride = along_x ? 1 : static_cast<size_t>(field.width);
-  const size_t middle = field.at(x, y);
-  step->gx = field.gx[middle];
-  step->gy = field.gy[middle];
+void LineTracer::measureNoise() {
+  // The 25 % quantile of absolute values, which edges hardly touch, is 0.319 standard deviations.
+  constexpr double kQuantile = 0.25, kSigmasAtQuantile = 0.3186;
+  constexpr int kColumns = 32, kWindowRows = 24;
+  std::array<std::array<float, 2 * kColumns * kWindowRows>, 4> values;
+  size_t count = 0;
+  std::array<EdgeResponse, EdgeProfiler::kRows> rows;
+  for (int j = 0; j < kWindowRows; ++j) {
+    for (int i = 0; i < kColumns; ++i) {
+      const int x = (2 * i + 1) * pixels_.width / (2 * kColumns);
+      const int y = (2 * j + 1) * pixels_.height / (2 * kWindowRows);
+      if (!usable_->contains(x, y) || !usable_->contains(x - 8, y) ||
+          !usable_->contains(x + 8, y) || !usable_->contains(x, y + 7)) {
+        continue;
+      }
+      profiler_.measure({true, y, static_cast<double>(x), 0}, &rows);
+      for (size_t half = 0; half < 2; ++half) {
+        EdgeResponse sum{};
+        for (size_t k = 4 * half; k < 4 * half + 4; ++k) {
+          sum.odd_narrow += rows[k].odd_narrow;
+          sum.even_narrow += rows[k].even_narrow;
+          sum.odd_wide += rows[k].odd_wide;
+          sum.even_wide += rows[k].even_wide;
+        }
+        values[0][count] = std::abs(sum.odd_narrow);
+        values[1][count] = std::abs(sum.even_narrow);
+        values[2][count] = std::abs(sum.odd_wide);
+        values[3][count] = std::abs(sum.even_wide);
+        ++count;
+      }
+    }
+  }
+  const auto sigma = [&](size_t i, double least) {
+    if (count == 0) return static_cast<float>(least);
+    const auto rank = static_cast<ptrdiff_t>(kQuantile * static_cast<double>(count));
+    std::nth_element(values[i].begin(),
+                     values[i].begin() + rank,
+                     values[i].begin() + static_cast<ptrdiff_t>(count));
+    const double value = static_cast<double>(values[i][static_cast<size_t>(rank)]) / 4;
+    return static_cast<float>(std::max(least, value / kSigmasAtQuantile));
+  };
+  // Rounding to whole grey levels is noise, too.
+  const EdgeResponse white = profiler_.whiteNoise();
+  const double rounding = std::sqrt(1.0 / 12) / 2;
+  noise_.odd_narrow = sigma(0, rounding * static_cast<double>(white.odd_narrow));
+  noise_.even_narrow = sigma(1, rounding * static_cast<double>(white.even_narrow));
+  noise_.odd_wide = sigma(2, rounding * static_cast<double>(white.odd_wide));
+  noise_.even_wide = sigma(3, rounding * static_cast<double>(white.even_wide));
+}
 
-  const auto component = [&](size_t i) { return field.gx[i] * e.x() + field.gy[i] * e.y(); };
-  // Usable pixels are 2 px from the border, so all five exist.
-  const size_t first = middle - 2 * stride;
-  std::array<double, 5> profile{};
-  for (size_t k = 0; k < 5; ++k) profile[k] = component(first + k * stride);
-  double best_distance = bound_px;
-  for (size_t k = 1; k < 4; ++k) {
-    const double sign = profile[k] < 0 ? -1 : 1;
-    const double before = sign * profile[k - 1], here = sign * profile[k];
-    const double after = sign * profile[k + 1];
-    if (!(here > before && here >= after)) continue;
-    const size_t i = first + k * stride;
-    if (field.magnitude[i] < min_magnitude) continue;
-    const double across = std::abs(field.gx[i] * e.y() - field.gy[i] * e.x());
-    if (!(across <= kMaxTangent * here)) continue;
-    const double offset = 0.5 * (before - after) / (before - 2 * here + after);
-    const double along_axis = centre + (static_cast<double>(k) - 2) + offset - crossing;
-    const double distance = std::abs(along_axis * e[axis]);
-    if (!(distance <= best_distance)) continue;
-    best_distance = distance;
-    step->is_edge = true;
-    step->along_x = along_x;
-    step->polarity = static_cast<int8_t>(sign);
-    step->pixel = static_cast<uint32_t>(i);
-    step->crest_px[axis] = crossing + along_axis;
-    step->crest_px[1 - axis] = row;
-  }
-  if (step->is_edge) {
-    step->ray = rays_.at(step->crest_px.x(), step->crest_px.y()).ray;
-    step->px_per_rad = 1 / curve.rad_per_px;
-  }
+/// Whether the curve crosses rows or columns here, and how; moves the front to the border between
+/// two of them. False where the camera ends.
+bool LineTracer::orient(Front* front) const {
+  Eigen::Vector2d& p = front->position;
+  const Eigen::Vector2d inside(std::clamp(p.x(), 0.0, pixels_.width - 1.0),
+                               std::clamp(p.y(), 0.0, pixels_.height - 1.0));
+  if (!((p - inside).squaredNorm() <= 1) || !rays_.covers(inside.x(), inside.y())) return false;
+  const RaySample sample = rays_.at(inside.x(), inside.y());
+  const Eigen::Vector2d g(sample.du.dot(normal_), sample.dv.dot(normal_));
+  front->crosses_rows = std::abs(g.x()) >= std::abs(g.y());
+  const int a = front->crosses_rows ? 0 : 1;
+  if (!(std::abs(g[a]) > 0)) return false;
+  front->slope = -g[1 - a] / g[a];
+  front->bend = 0;
+  const double before = p[1 - a];
+  p[1 - a] = std::floor(before) + 0.5;
+  p[a] += (p[1 - a] - before) * front->slope;
+  front->has_slope = true;
   return true;
 }
 
+/// The next eight rows (columns) that the curve crosses; false where the camera ends.
+bool LineTracer::evaluate(Front* front, int direction, std::array<Quad, 2>* quads) const {
+  constexpr double kHalf = EdgeProfiler::kRows / 2.0;
+  Eigen::Vector2d p = front->position;
+  if (!front->has_slope && !orient(front)) return false;
+  p = front->position;
+  const int a = front->crosses_rows ? 0 : 1;  // axis across the rows
+  // Along the curve's tangent (-ny, nx) turned by `direction`: which way along the rows?
+  const int first_row = direction > 0 ? static_cast<int>(std::floor(p[1 - a] + 1))
+                                      : static_cast<int>(std::floor(p[1 - a] + 1)) - 8;
+  const double centre = first_row + kHalf - 0.5;
+  const double ahead = centre - p[1 - a];
+  Eigen::Vector2d at;
+  at[1 - a] = centre;
+  at[a] = p[a] + ahead * (front->slope + 0.5 * ahead * front->bend);
+  RaySample sample;
+  Eigen::Vector2d g;
+  for (int iteration = 0; iteration < 3; ++iteration) {
+    const double u = std::clamp(at.x(), 0.0, pixels_.width - 1.0);
+    const double v = std::clamp(at.y(), 0.0, pixels_.height - 1.0);
+    if (std::abs(u - at.x()) + std::abs(v - at.y()) > 4 || !rays_.covers(u, v)) return false;
+    sample = rays_.at(u, v);
+    g = {sample.du.dot(normal_), sample.dv.dot(normal_)};
+    if (!(std::abs(g[a]) * 4 > std::abs(g[1 - a]))) return false;
+    const double f = sample.ray.dot(normal_) + (at.x() - u) * g.x() + (at.y() - v) * g.y();
+    const double step = -f / g[a];
+    if (!(std::abs(step) < 4)) return false;
+    sample.ray += (at.x() - u) * sample.du + (at.y() - v) * sample.dv;
+    sample.ray += step * (a == 0 ? sample.du : sample.dv);
+    at[a] += step;
+    if (std::abs(step) < 0.05) break;
+  }
+  const double slope = -g[1 - a] / g[a];
+  const double bend = (slope - front->slope) / ahead;
+  // The mean of a parabola over the eight rows.
+  constexpr double kMeanSquare = 5.25;
+  EdgeWindow window{front->crosses_rows, first_row, at[a] + 0.5 * bend * kMeanSquare, slope};
+  std::array<EdgeResponse, EdgeProfiler::kRows> rows;
+  profiler_.measure(window, &rows);
+
+  const Eigen::Vector3d& across = a == 0 ? sample.du : sample.dv;
+  const Eigen::Vector3d along = (a == 0 ? sample.dv : sample.du) + slope * across;
+  const double perpendicular = std::abs(g[a]) / g.norm();
+  for (size_t half = 0; half < 2; ++half) {
+    const size_t first = (direction > 0) == (half == 0) ? 0 : 4;
+    Quad& q = (*quads)[half];
+    const double ahead_of_centre = first == 0 ? -2 : 2;
+    q.ray = projected(sample.ray + ahead_of_centre * along, normal_);
+    q.across = across;
+    Eigen::Vector2d px;
+    px[a] = at[a] + ahead_of_centre * slope;
+    px[1 - a] = centre + ahead_of_centre;
+    q.x = static_cast<float>(px.x());
+    q.y = static_cast<float>(px.y());
+    q.slope = static_cast<float>(slope);
+    q.perpendicular = static_cast<float>(perpendicular);
+    q.crosses_rows = front->crosses_rows;
+    q.way = static_cast<int8_t>(direction);
+    EdgeResponse mean{};
+    q.turn = 0;
+    for (size_t k = 0; k < 4; ++k) {
+      const EdgeResponse& r = rows[first + k];
+      q.turn += (static_cast<float>(k) - 1.5F) * (wide_ ? r.even_wide : r.even_narrow) / 5;
+      mean.odd_narrow += r.odd_narrow / 4;
+      mean.even_narrow += r.even_narrow / 4;
+      mean.odd_wide += r.odd_wide / 4;
+      mean.even_wide += r.even_wide / 4;
+      q.odd[direction > 0 ? k : 3 - k] = wide_ ? r.odd_wide : r.odd_narrow;
+    }
+    q.mean = mean;
+    judge(&q);
+  }
+  // On to the border behind the eight rows.
+  const double rest = direction * kHalf;
+  front->position[1 - a] = centre + rest;
+  front->position[a] = at[a] + rest * (slope + 0.5 * rest * bend);
+  front->slope = slope + rest * bend;
+  front->bend = bend;
+  if (!(std::abs(front->slope) < kTurnRatio)) front->has_slope = false;
+  return true;
+}
+
+void LineTracer::judge(Quad* quad) const {
+  const float odd = wide_ ? quad->mean.odd_wide : quad->mean.odd_narrow;
+  const float even = wide_ ? quad->mean.even_wide : quad->mean.even_narrow;
+  const float noise = wide_ ? noise_.even_wide : noise_.even_narrow;
+  // The offset's change from row to row, by least squares, scatters 2 / sqrt(5) as much as the
+  // mean.
+  constexpr float kTurnScatter = 0.894F;
+  const float turn = std::abs(quad->turn) * quad->perpendicular * quad->perpendicular;
+  quad->is_edge = std::abs(odd) >= (wide_ ? min_odd_wide_ : min_odd_narrow_) &&
+                  std::abs(even) * quad->perpendicular <= bound_px_ * std::abs(odd) &&
+                  turn <= kMaxTangent * std::abs(odd) + 2 * kTurnScatter * noise &&
+                  std::abs(quad->mean.odd_wide) <=
+                      kMaxWideRatio * std::abs(quad->mean.odd_narrow) + 2 * noise_.odd_wide;
+  quad->offset_px = quad->is_edge ? even / odd : 0;
+  // What a filter of fixed shape leaves of an edge of another blur, and of its neighbours.
+  constexpr float kModelVariance = 0.03F * 0.03F;
+  quad->variance_px2 = quad->is_edge ? noise * noise / (odd * odd) + kModelVariance : 0;
+}
+
+void LineTracer::add(const Quad& quad) {
+  if (!quad.is_edge) return;
+  const Eigen::Vector3d ray = quad.ray + static_cast<double>(quad.offset_px) * quad.across;
+  const double rad_per_px = quad.across.dot(normal_);
+  const double variance = rad_per_px * rad_per_px * static_cast<double>(quad.variance_px2);
+  moments_.add(ray, 1 / variance);
+  ++points_;
+}
+
 bool LineTracer::refit() {
-  const auto fit = fitPlane(moments_);
-  if (!fit) return false;
-  normal_ = fit->normal.dot(normal_) < 0 ? Eigen::Vector3d(-fit->normal) : fit->normal;
+  const auto normal = refinePlane(moments_, normal_);
+  if (!normal) return false;
+  normal_ = *normal;
   points_at_fit_ = points_;
   return true;
 }
 
-void LineTracer::extend(const GradientField& field,
-                        uint16_t min_magnitude,
-                        double bound_px,
-                        int direction,
-                        std::vector<Step>* steps,
-                        Front* front) {
+void LineTracer::extend(int direction, std::vector<Quad>* quads, Front* front) {
   int misses = 0;
-  for (size_t i = steps->size(); i-- > 0 && !(*steps)[i].is_edge;) ++misses;
-  Eigen::Vector2d position = front->position;
-  Eigen::Vector2d normal = front->normal;
-  Eigen::Vector3d last_ray = rays_.at(position.x(), position.y()).ray;
-  while (!front->ended && misses <= options_.max_gap_px) {
-    // One step along the curve, and back onto it: one Newton step leaves errors of second order in
-    // the curve's turn over a pixel.
-    Eigen::Vector2d next = position + direction * Eigen::Vector2d(-normal.y(), normal.x());
-    const int x = static_cast<int>(std::floor(next.x() + 0.5));
-    const int y = static_cast<int>(std::floor(next.y() + 0.5));
-    if (!rays_.isUsable(x, y)) {
-      front->ended = front->at_border = true;
-      break;
-    }
-    const RaySample sample = rays_.at(next.x(), next.y());
-    const CurveOffset curve = curveOffset(sample, normal_);
-    angle_rad_ += (sample.ray - last_ray).norm();
-    if (!(curve.rad_per_px > 0) || !(std::abs(curve.offset_px) < 1) || angle_rad_ > kMaxAngleRad) {
-      front->ended = true;
-      break;
-    }
-    next -= curve.offset_px * curve.normal;
-    Step step{};
-    if (!evaluate(field, min_magnitude, bound_px, next, curve, &step)) {
-      front->ended = front->at_border = true;
-      break;
-    }
-    last_ray = sample.ray;
-    position = next;
-    normal = curve.normal;
-    steps->push_back(step);
-    if (step.is_edge) {
-      misses = 0;
-      moments_.add(step.ray, step.px_per_rad * step.px_per_rad);
-      ++points_;
-      if (points_ >= points_at_fit_ + std::max(8, points_at_fit_ / 4)) {
-        if (!refit()) front->ended = true;
+  std::array<Quad, 2> next;
+  Eigen::Vector3d last_ray = quads->empty() ? Eigen::Vector3d::Zero() : quads->back().ray;
+  while (!front->ended) {
+    // The walk goes along the tangent; which way that is along the rows changes with them.
+    int way = direction;
+    if (!quads->empty()) {
+      const Quad& last = quads->back();
+      way = last.way;
+      if (!front->has_slope && !orient(front)) {
+        front->ended = front->at_border = true;
+        break;
       }
-    } else {
-      ++misses;
+      if (front->crosses_rows != last.crosses_rows) {
+        // Rows become columns, or the other way round.
+        way = last.slope * static_cast<float>(last.way) > 0 ? 1 : -1;
+      }
+    }
+    if (!evaluate(front, way, &next)) {
+      front->ended = front->at_border = true;
+      break;
+    }
+    for (const Quad& q : next) {
+      const int x = static_cast<int>(std::floor(static_cast<double>(q.x) + 0.5));
+      const int y = static_cast<int>(std::floor(static_cast<double>(q.y) + 0.5));
+      if (!usable_->contains(x, y)) {
+        front->ended = front->at_border = true;
+        break;
+      }
+      if (!last_ray.isZero()) angle_rad_ += (q.ray - last_ray).norm();
+      last_ray = q.ray;
+      quads->push_back(q);
+      if (q.is_edge) {
+        misses = 0;
+        add(q);
+      } else if (++misses * kQuadPx > options_.max_gap_px) {
+        front->ended = true;
+        break;
+      }
+    }
+    if (angle_rad_ > kMaxAngleRad) front->ended = true;
+    if (points_ >= points_at_fit_ + std::max(4, points_at_fit_ / 2) && !refit()) {
+      front->ended = true;
     }
   }
-  front->position = position;
-  front->normal = normal;
 }
 
-/// Cuts what lies beyond the last step that is an edge, and runs shorter than kMinRunPx that are
-/// only reached across a gap.
-void LineTracer::cutTail(std::vector<Step>* steps) {
+/// Cuts what lies beyond the last edge, and runs shorter than kMinRunPx that are only reached
+/// across a gap.
+void LineTracer::cutTail(std::vector<Quad>* quads) {
   for (;;) {
-    while (!steps->empty() && !steps->back().is_edge) steps->pop_back();
-    int run = 0, misses = 0;
-    for (size_t i = steps->size(); i-- > 0 && misses < kGapPx;) {
-      if ((*steps)[i].is_edge) {
-        ++run;
-        misses = 0;
-        if (run >= kMinRunPx) return;
-      } else {
-        ++misses;
-      }
+    while (!quads->empty() && !quads->back().is_edge) quads->pop_back();
+    int run = 0;
+    size_t i = quads->size();
+    while (i > 0 && (*quads)[i - 1].is_edge && run * kQuadPx < kMinRunPx) {
+      --i;
+      ++run;
     }
-    if (misses < kGapPx) return;
-    for (int edges = 0; edges < run;) {
-      edges += (*steps).back().is_edge ? 1 : 0;
-      steps->pop_back();
-    }
+    if (i == 0 || run * kQuadPx >= kMinRunPx) return;
+    quads->resize(i);
   }
 }
 
 /// Residuals of an arc of radius r and length l against its best plane are a parabola of height
 /// (sagitta) l^2 / (8 r), which is fitted here.
-bool LineTracer::isArc(const std::vector<Step>& steps, const Eigen::Vector3d& normal) const {
-  // Corners round the last pixels off.
-  constexpr size_t kEndPx = 3;
-  // What the crests of edges without noise leave.
-  constexpr double kFloorPx = 0.15;
-  if (steps.size() < 2 * kEndPx + 8) return false;
-  const double half_length_px = 0.5 * static_cast<double>(steps.size() - 1 - 2 * kEndPx);
-  double n = 0, sum_r = 0, sum_q = 0, sum_qq = 0, sum_qr = 0, sum_rr = 0;
-  for (size_t i = kEndPx; i + kEndPx < steps.size(); ++i) {
-    const Step& s = steps[i];
+bool LineTracer::isArc(const Eigen::Vector3d& normal) const {
+  // What the filters leave of edges without noise.
+  constexpr double kFloorPx = 0.06;
+  if (quads_.size() < 4) return false;
+  const double half_length = 0.5 * static_cast<double>(quads_.size() - 1);
+  double length_px = 0;  // from the middle of the first to that of the last
+  double n = 0, sum_r = 0, sum_q = 0, sum_qq = 0, sum_qr = 0, sum_rr = 0, noise = 0;
+  for (size_t i = 0; i < quads_.size(); ++i) {
+    const Quad& s = quads_[i];
+    if (i > 0) length_px += kQuadPx / static_cast<double>(s.perpendicular);
     if (!s.is_edge) continue;
-    const double t = static_cast<double>(i - kEndPx) / half_length_px - 1;  // -1 ... 1
-    const double q = t * t, r = s.ray.dot(normal) * s.px_per_rad;
+    const double t = static_cast<double>(i) / half_length - 1;  // -1 ... 1
+    const Eigen::Vector3d ray = s.ray + static_cast<double>(s.offset_px) * s.across;
+    const double q = t * t;
+    const double r = ray.dot(normal) / s.across.dot(normal) * static_cast<double>(s.perpendicular);
     n += 1;
     sum_r += r;
     sum_q += q;
     sum_qq += q * q;
     sum_qr += q * r;
     sum_rr += r * r;
+    noise += static_cast<double>(s.variance_px2);
   }
-  if (n < 8) return false;
+  if (n < 4) return false;
   const double qq = sum_qq - sum_q * sum_q / n;
   const double qr = sum_qr - sum_q * sum_r / n;
   const double rr = sum_rr - sum_r * sum_r / n;
   if (!(qq > 0)) return false;
   const double sagitta_px = std::abs(qr) / qq;
-  const double variance = std::max(0.0, rr - qr * qr / qq) / (n - 3);
-  const double sigma_px = std::sqrt(variance / qq * AlignmentCounter::kCorrelatedPx);
-  return sagitta_px > kFloorPx + 3 * sigma_px &&
-         half_length_px * half_length_px < 2 * sagitta_px * options_.min_bend_radius_px;
+  const double variance = std::max(noise / n, std::max(0.0, rr - qr * qr / qq) / (n - 3));
+  const double sigma_px = std::sqrt(variance / qq);
+  const double half_px = length_px / 2;
+  return sagitta_px > kFloorPx + 2.5 * sigma_px &&
+         half_px * half_px < 2 * sagitta_px * options_.min_bend_radius_px;
 }
 
-LineTracer::End LineTracer::endOf(const Step& last, int direction, bool at_border) const {
-  End end{last.crest_px, last.ray};
+/// Under the background model, noise of the measured level alone, the squares of the responses add
+/// up to a chi-square with a degree of freedom per four rows (fewer: neighbours are correlated if
+/// the noise is). Its tail is bounded by Chernoff. One row of noise can't speak for many: a
+/// response counts as kMaxSigmas at most. Tests: every pair of pixels as ends.
+double LineTracer::scoreOf() const {
+  constexpr double kCorrelated = 1.5, kMaxSigmas = 6;
+  // Shading is subtracted as far as the line as a whole shows it.
+  const auto narrow_ramp = static_cast<double>(profiler_.shading().odd_narrow);
+  const auto wide_ramp = static_cast<double>(profiler_.shading().odd_wide);
+  double narrow = 0, wide = 0;
+  for (const Quad& q : quads_) {
+    narrow += std::abs(static_cast<double>(q.mean.odd_narrow));
+    wide += std::abs(static_cast<double>(q.mean.odd_wide));
+  }
+  const double count = static_cast<double>(quads_.size());
+  const double ramp = std::max(0.0, wide - narrow) / (wide_ramp - narrow_ramp) / count;
+  const double shading = ramp * (wide_ ? wide_ramp : narrow_ramp);
+  const double sigma = static_cast<double>(wide_ ? noise_.odd_wide : noise_.odd_narrow);
+  double n = 0, sum = 0;
+  for (const Quad& q : quads_) {
+    const double odd = std::abs(static_cast<double>(wide_ ? q.mean.odd_wide : q.mean.odd_narrow));
+    const double t = std::max(0.0, odd - shading) / sigma;
+    n += 1;
+    if (q.is_edge) sum += std::min(t * t, kMaxSigmas * kMaxSigmas);
+  }
+  const double pixels = static_cast<double>(pixels_.width) * pixels_.height;
+  const double log_tests = 2 * std::log10(pixels);
+  if (!(sum > n)) return -log_tests;
+  return (sum - n - n * std::log(sum / n)) / (2 * kCorrelated * std::log(10.0)) - log_tests;
+}
+
+/// How many rows of the last quad belong to the line (the first if it is the other one's turn),
+/// counted from within: the cut that fits best to an edge before and nothing behind.
+int LineTracer::rowsOfEnd(size_t first, size_t last) const {
+  const Quad& q = quads_[last];
+  double level = 0;
+  int count = 0;
+  const ptrdiff_t back = first < last ? -1 : 1;
+  for (auto i = static_cast<ptrdiff_t>(last); count < 3; i += back) {
+    const Quad& k = quads_[static_cast<size_t>(i)];
+    if (k.is_edge) {
+      level += std::abs(static_cast<double>(wide_ ? k.mean.odd_wide : k.mean.odd_narrow));
+      ++count;
+    }
+    if (i == static_cast<ptrdiff_t>(first)) break;
+  }
+  level /= count;
+  const double sign = (wide_ ? q.mean.odd_wide : q.mean.odd_narrow) < 0 ? -1 : 1;
+  double best = 0, sum = 0;
+  int rows = 0;
+  for (int i = 0; i < kQuadPx; ++i) {
+    const size_t row = static_cast<size_t>(first < last ? i : kQuadPx - 1 - i);
+    sum += sign * static_cast<double>(q.odd[row]) - 0.5 * level;
+    if (sum >= best) {
+      best = sum;
+      rows = i + 1;
+    }
+  }
+  return rows;
+}
+
+/// The end of the line at quad `last`; `first` is at the other one.
+LineTracer::End LineTracer::endOf(size_t first, size_t last, bool at_border) const {
+  const Quad& q = quads_[last];
+  const int direction = first < last ? 1 : -1;
+  const double rows = at_border ? kQuadPx : rowsOfEnd(first, last);
+  const int a = q.crosses_rows ? 0 : 1;
+  Eigen::Vector2d px(static_cast<double>(q.x), static_cast<double>(q.y));
+  const double ahead = direction * q.way * (rows - 2);
+  px[1 - a] += ahead;
+  px[a] += ahead * static_cast<double>(q.slope);
+  if (!rays_.covers(px.x(), px.y())) px = {static_cast<double>(q.x), static_cast<double>(q.y)};
+  End end{px, rays_.at(px.x(), px.y()).ray};
   if (!at_border) return end;
-  Eigen::Vector2d position = last.curve_px;
-  for (int i = 0; i < options_.max_gap_px; ++i) {
-    const CurveOffset here = curveOffset(rays_.at(position.x(), position.y()), normal_);
-    position += direction * Eigen::Vector2d(-here.normal.y(), here.normal.x()) -
-                here.offset_px * here.normal;
-    if (!(here.rad_per_px > 0) || !rays_.covers(position.x(), position.y())) break;
-    end = {position, rays_.at(position.x(), position.y()).ray};
+  const int way = direction * q.way;
+  for (int i = 0; i < options_.max_gap_px + kQuadPx; ++i) {
+    const RaySample here = rays_.at(px.x(), px.y());
+    const Eigen::Vector2d g(here.du.dot(normal_), here.dv.dot(normal_));
+    if (!(std::abs(g[a]) > 0)) break;
+    const double f = here.ray.dot(normal_);
+    px[a] -= f / g[a] + way * g[1 - a] / g[a];
+    px[1 - a] += way;
+    if (!rays_.covers(px.x(), px.y())) break;
+    end = {px, rays_.at(px.x(), px.y()).ray};
   }
   return end;
 }
 
-std::optional<TracedLine> LineTracer::trace(const GradientField& field,
-                                            const EdgeThresholds& thresholds,
-                                            double noise,
-                                            const TraceSeed& seed) {
-  forward_.clear();
-  backward_.clear();
-  moments_ = seed.moments;
-  normal_ = seed.normal;
-  points_ = points_at_fit_ = seed.points;
+std::optional<TracedLine> LineTracer::trace(const PlanarPiece& piece,
+                                            const std::vector<Eigen::Vector2f>& nodes) {
+  normal_ = piece.normal;
+  moments_ = {};
+  points_ = points_at_fit_ = 0;
   angle_rad_ = 0;
+  wide_ = false;
+  bound_px_ = 1.5F;  // chains are whole pixels
 
-  // The vertex of a parabola through a crest of height P scatters by about 2 noise / P px.
-  const double expected_rms_px = 2 * noise * kGradientUnit / std::max(seed.gradient, 1.0);
-  const double bound_px =
-      std::clamp(options_.max_residual_sigmas * std::max(seed.rms_px, expected_rms_px),
+  // The plane of the piece from a few of its rows.
+  constexpr uint32_t kProbes = 6;
+  const uint32_t probes = std::min(kProbes, piece.nodes);
+  std::array<Quad, 2> pair;
+  double level = 0, wide_level = 0;
+  for (uint32_t i = 0; i < probes; ++i) {
+    const uint32_t node = piece.first_node + (2 * i + 1) * piece.nodes / (2 * probes);
+    Front front;
+    front.position = nodes[node].cast<double>();
+    // Eight rows around the node.
+    const RaySample sample = rays_.at(front.position.x(), front.position.y());
+    const Eigen::Vector2d g(sample.du.dot(normal_), sample.dv.dot(normal_));
+    const int a = std::abs(g.x()) >= std::abs(g.y()) ? 0 : 1;
+    if (!(std::abs(g[a]) > 0)) continue;
+    front.position[a] -= sample.ray.dot(normal_) / g[a];
+    front.position[1 - a] -= 4;
+    front.position[a] += 4 * g[1 - a] / g[a];
+    if (!evaluate(&front, +1, &pair)) continue;
+    for (const Quad& q : pair) {
+      if (!q.is_edge) continue;
+      add(q);
+      level += std::abs(static_cast<double>(q.mean.odd_narrow));
+      wide_level += std::abs(static_cast<double>(q.mean.odd_wide));
+    }
+  }
+  if (points_ < 2 || !refit()) return std::nullopt;
+  const double tolerance = 2 * static_cast<double>(noise_.odd_narrow) * std::sqrt(points_);
+  const bool stands_alone = wide_level >= kAloneRatio[0] * level - tolerance &&
+                            wide_level <= kAloneRatio[1] * level + tolerance;
+  level /= points_;
+  const double narrow_sigma_px = static_cast<double>(noise_.even_narrow) / level;
+  const double wide_sigma_px = static_cast<double>(noise_.even_wide) / level;
+  wide_ = narrow_sigma_px > kMaxNarrowSigmaPx && stands_alone;
+  bound_px_ = static_cast<float>(
+      std::clamp(options_.max_residual_sigmas * (wide_ ? wide_sigma_px : narrow_sigma_px),
                  options_.tight_rho_px,
-                 options_.rho_px);
-
-  const CurveOffset at_start = curveOffset(rays_.at(seed.start_px.x(), seed.start_px.y()), normal_);
-  if (!(at_start.rad_per_px > 0) || !(std::abs(at_start.offset_px) < 2)) return std::nullopt;
-  Front front;
-  front.normal = at_start.normal;
-  front.position = seed.start_px - at_start.offset_px * at_start.normal;
-  if (!rays_.isUsable(static_cast<int>(std::floor(front.position.x() + 0.5)),
-                      static_cast<int>(std::floor(front.position.y() + 0.5)))) {
-    return std::nullopt;
-  }
-  Front back = front;
-  // Twice each way: what one end adds to the plane may let the other one go on.
-  for (int round = 0; round < 2; ++round) {
-    extend(field, thresholds.chain, bound_px, +1, &forward_, &front);
-    extend(field, thresholds.chain, bound_px, -1, &backward_, &back);
-    if (!refit()) return std::nullopt;
-  }
-  // One sequence from the backward end to the forward end.
-  std::reverse(backward_.begin(), backward_.end());
-  backward_.insert(backward_.end(), forward_.begin(), forward_.end());
-  // Cut as a whole: what is left of the start may be no more than a short run beyond a gap.
-  const auto cutEnd = [&](Front* end) {
-    const size_t size = backward_.size();
-    cutTail(&backward_);
-    // A cut by more than a flaw means that the edge had ended before the border.
-    end->at_border = end->at_border && backward_.size() + kGapPx > size;
-  };
-  cutEnd(&front);
-  std::reverse(backward_.begin(), backward_.end());
-  cutEnd(&back);
-  std::reverse(backward_.begin(), backward_.end());
-  const std::vector<Step>& steps = backward_;  // first and last are edges
-  if (steps.size() < 2 || static_cast<double>(steps.size()) < options_.min_length_px) {
-    return std::nullopt;
-  }
+                 options_.rho_px));
 
   moments_ = {};
-  AlignmentCounter alignment;
-  long polarity = 0;
-  const auto min_gradient = static_cast<float>(thresholds.chain);
-  crest_pixels_.clear();
-  crest_along_x_.clear();
-  for (const Step& s : steps) {
-    const bool has_gradient = s.gx * s.gx + s.gy * s.gy >= min_gradient * min_gradient;
-    alignment.add(static_cast<double>(s.gx),
-                  static_cast<double>(s.gy),
-                  {static_cast<double>(s.nx), static_cast<double>(s.ny)},
-                  has_gradient);
-    if (!s.is_edge) continue;
-    moments_.add(s.ray, s.px_per_rad * s.px_per_rad);
-    crest_pixels_.push_back(s.pixel);
-    crest_along_x_.push_back(static_cast<uint8_t>(s.along_x));
+  points_ = points_at_fit_ = 0;
+  quads_.clear();
+  forward_.clear();
+  const Eigen::Vector2d start = piece.start_px;
+  const RaySample sample = rays_.at(start.x(), start.y());
+  const Eigen::Vector2d g(sample.du.dot(normal_), sample.dv.dot(normal_));
+  if (!(g.norm() > 0)) return std::nullopt;
+  const double f = sample.ray.dot(normal_) / g.norm();
+  if (!(std::abs(f) < 3)) return std::nullopt;
+  Front front;
+  front.position = start - f * g.normalized();
+  Front back = front;
+  points_at_fit_ = 8;
+  extend(+1, &forward_, &front);
+  // The same border between rows, the other way.
+  extend(-1, &quads_, &back);
+  if (points_ < 2 || !refit()) return std::nullopt;
+  const auto cut = [&](std::vector<Quad>* quads, Front* end) {
+    const size_t size = quads->size();
+    cutTail(quads);
+    end->at_border = end->at_border && quads->size() == size;
+  };
+  std::reverse(quads_.begin(), quads_.end());
+  for (Quad& q : quads_) {
+    q.way = static_cast<int8_t>(-q.way);
+    std::reverse(q.odd.begin(), q.odd.end());
   }
+  quads_.insert(quads_.end(), forward_.begin(), forward_.end());
+  cut(&quads_, &front);
+  std::reverse(quads_.begin(), quads_.end());
+  cut(&quads_, &back);
+  std::reverse(quads_.begin(), quads_.end());
+  if (quads_.size() < 3) return std::nullopt;
+
+  // Near its ends an edge meets others, which move it: a line that has enough points does without.
+  constexpr size_t kEnoughQuads = 7;
+  const size_t last = quads_.size() - 1;
+  size_t begin = 0, end = quads_.size();
+  if (end >= kEnoughQuads) {
+    begin = rowsOfEnd(last, 0) > 2 ? 1 : 2;
+    end -= rowsOfEnd(0, last) > 2 ? 1 : 2;
+  }
+  moments_ = {};
+  points_ = 0;
+  for (size_t i = begin; i < end; ++i) add(quads_[i]);
+  if (points_ < 2) return std::nullopt;
   const auto fit = fitPlane(moments_);
   if (!fit) return std::nullopt;
+  normal_ = normal_.dot(fit->normal) < 0 ? Eigen::Vector3d(-fit->normal) : fit->normal;
 
   TracedLine line;
   line.fit = *fit;
-  line.score = alignment.score(field.width, field.height);
-  double sum2 = 0;
+  double sum2 = 0, chi2 = 0, side = 0;
   line.max_px = 0;
   line.length_px = 0;
-  for (size_t i = 0; i < steps.size(); ++i) {
-    const Step& s = steps[i];
-    if (i > 0) line.length_px += (s.curve_px - steps[i - 1].curve_px).norm();
-    if (!s.is_edge) continue;
-    const RaySample sample = rays_.at(s.crest_px.x(), s.crest_px.y());
-    const double err = reprojectionErrorFirstOrder(sample, fit->normal);
-    sum2 += err * err;
-    line.max_px = std::max(line.max_px, err);
-    const double nx = static_cast<double>(s.nx), ny = static_cast<double>(s.ny);
-    const double side = sample.du.dot(fit->normal) * nx + sample.dv.dot(fit->normal) * ny;
-    polarity += side < 0 ? -s.polarity : s.polarity;
+  for (size_t i = 0; i < quads_.size(); ++i) {
+    const Quad& q = quads_[i];
+    if (i > 0) {
+      line.length_px += std::hypot(static_cast<double>(q.x - quads_[i - 1].x),
+                                   static_cast<double>(q.y - quads_[i - 1].y));
+    }
+    if (!q.is_edge || i < begin || i >= end) continue;
+    const double rad_per_px = q.across.dot(fit->normal);
+    const Eigen::Vector3d ray = q.ray + static_cast<double>(q.offset_px) * q.across;
+    const double across_px = ray.dot(fit->normal) / rad_per_px;
+    const double err_px = std::abs(across_px) * static_cast<double>(q.perpendicular);
+    sum2 += err_px * err_px;
+    chi2 += across_px * across_px / static_cast<double>(q.variance_px2);
+    line.max_px = std::max(line.max_px, err_px);
+    side += static_cast<double>(q.mean.odd_narrow) * rad_per_px > 0 ? 1 : -1;
   }
-  line.edge_points = static_cast<int>(crest_pixels_.size());
-  line.rms_px = std::sqrt(sum2 / line.edge_points);
-  line.is_arc = isArc(steps, fit->normal);
-  line.polarity = polarity < 0 ? -1 : 1;
-  normal_ = normal_.dot(fit->normal) < 0 ? Eigen::Vector3d(-fit->normal) : fit->normal;
-  const End from = endOf(steps.front(), -1, back.at_border);
-  const End to = endOf(steps.back(), +1, front.at_border);
+  line.rms_px = std::sqrt(sum2 / points_);
+  // Few residuals say little: the measured noise counts as kPriorPoints of them.
+  constexpr double kPriorPoints = 4;
+  line.variance_factor = (chi2 + kPriorPoints) / (points_ - 2 + kPriorPoints);
+  double narrow = 0, wide = 0;
+  for (const Quad& q : quads_) {
+    narrow += std::abs(static_cast<double>(q.mean.odd_narrow));
+    wide += std::abs(static_cast<double>(q.mean.odd_wide));
+  }
+  if (!(wide <= static_cast<double>(kMaxWideRatio) * narrow)) return std::nullopt;
+  line.is_arc = options_.min_bend_radius_px > 0 && isArc(fit->normal);
+  line.polarity = side < 0 ? -1 : 1;
+  line.score = scoreOf();
+  const End from = endOf(last, 0, back.at_border);
+  const End to = endOf(0, last, front.at_border);
   line.from_ray = from.ray;
   line.to_ray = to.ray;
-  line.from_px = from.px;
-  line.to_px = to.px;
-  line.middle_ray =
-      rays_.at(steps[steps.size() / 2].curve_px.x(), steps[steps.size() / 2].curve_px.y()).ray;
-  line.length_px +=
-      (from.px - steps.front().crest_px).norm() + (to.px - steps.back().crest_px).norm();
+  line.middle_ray = quads_[quads_.size() / 2].ray;
+  const auto centre = [](const Quad& q) {
+    return Eigen::Vector2d(static_cast<double>(q.x), static_cast<double>(q.y));
+  };
+  const auto beyond = [&](const End& tip, size_t here, size_t before) {
+    const Eigen::Vector2d d = tip.px - centre(quads_[here]);
+    return d.dot(centre(quads_[here]) - centre(quads_[before])) < 0 ? -d.norm() : d.norm();
+  };
+  line.length_px += beyond(from, 0, 1) + beyond(to, last, last - 1);
+  if (!(line.length_px >= options_.min_length_px)) return std::nullopt;
   return line;
 }
 

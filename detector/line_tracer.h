@@ -1,77 +1,84 @@
 #pragma once
-// Follows the image of a plane through the optical centre as far as the image shows an edge there.
+// Follows the image of a plane through the optical centre as far as the image shows an edge there,
+// and fits the plane to that edge, all on the pixels as given.
 
 #include <Eigen/Core>
+#include <array>
 #include <optional>
 #include <vector>
 
-#include "detector/edge_drawing.h"
-#include "detector/gradient.h"
+#include "cameras/ray_table.h"
+#include "detector/edge_profile.h"
 #include "detector/options.h"
+#include "detector/planar_chain.h"
 #include "detector/plane_fit.h"
-#include "detector/ray_table.h"
-#include "detector/validation.h"
+#include "detector/usable_mask.h"
 
 namespace dlsd {
 
-/// What a trace needs to know of the line it starts from.
-struct TraceSeed {
-  Eigen::Vector3d normal;
-  RayMoments moments;        ///< That gave the normal, weights in px^2 per rad^2.
-  int points;                ///< Number of rays in them.
-  Eigen::Vector2d start_px;  ///< Near the curve, within 1 px of a usable pixel.
-  double rms_px;             ///< Residuals of the seed's edge pixels.
-  double gradient;           ///< Typical magnitude on it, in units of GradientField.
-};
-
 struct TracedLine {
-  PlaneFit fit;                      ///< Weights in px^-2: squared_residuals is in px^2.
+  PlaneFit fit;            ///< Weights 1 / variance of the points: inverse_in_plane is the
+                           ///< covariance if the noise is as measured.
+  double variance_factor;  ///< By which it is larger, from the residuals.
   Eigen::Vector3d from_ray, to_ray;  ///< Rays of the ends (near the plane, not on it).
   Eigen::Vector3d middle_ray;        ///< Of a point between them: tells which way round.
-  Eigen::Vector2d from_px, to_px;    ///< Those ends.
   double length_px;                  ///< Along the curve.
-  int edge_points;
-  double rms_px, max_px;  ///< Reprojection errors of the edge points.
-  bool is_arc;            ///< Bends with a radius below min_bend_radius_px.
-  int polarity;           ///< +1: brighter on the side fit.normal points to.
+  double rms_px, max_px;             ///< Distances of the edge points from the curve.
+  bool is_arc;                       ///< Bends with a radius below min_bend_radius_px.
+  int polarity;                      ///< +1: brighter on the side fit.normal points to.
   double score;
+};
+
+/// Standard deviations over the parts of an image without edges of the means of four rows of the
+/// four responses.
+struct ResponseNoise {
+  float odd_narrow = 0, even_narrow = 0, odd_wide = 0, even_wide = 0;
 };
 
 class LineTracer {
  public:
   LineTracer(const RayTable& rays, const ValidationOptions& options);
 
-  /// From the seed in both directions, in steps of one pixel along the curve. A step shows an edge
-  /// if a crest of the gradient along the curve's normal lies within the bound of the residuals of
-  /// the curve and its gradient is within pi / 8 of the normal, of either sign. The plane is
-  /// refitted to the crests as the line grows. The line ends before max_gap_px + 1 steps without an
-  /// edge; a gap is only crossed to reach at least kMinRunPx more.
-  /// A line that still shows an edge where the usable part of the image ends is taken to go on to
-  /// the border or rim itself, but at most max_gap_px. No value if fewer than min_length_px remain.
-  [[nodiscard]] std::optional<TracedLine> trace(const GradientField& field,
-                                                const EdgeThresholds& thresholds,
-                                                double noise,
-                                                const TraceSeed& seed);
+  /// Takes the image for the traces that follow, and measures its noise.
+  /// @param min_contrast  What an edge must have, in grey levels.
+  void setImage(const GreyPixels& pixels, const BitRows& usable, double min_contrast);
+  [[nodiscard]] const ResponseNoise& noise() const { return noise_; }
 
-  /// Crests of the last trace, from its first to its last point: index into the image.
-  [[nodiscard]] const std::vector<uint32_t>& crestPixels() const { return crest_pixels_; }
-  /// Whether the crest at each of them lies along x (its neighbours across are index -+ 1).
-  [[nodiscard]] const std::vector<uint8_t>& crestAlongX() const { return crest_along_x_; }
+  /// From the middle of the piece in both directions, four rows (columns) at a time. Four rows show
+  /// an edge if the mean response is that of a step of either sign above the noise, within the
+  /// bound of the residuals of the curve. The plane is refitted as the line grows. The line ends
+  /// where more than max_gap_px show no edge; a gap is only crossed to reach at least kMinRunPx
+  /// more. A line that still shows an edge where the usable part of the image ends is taken to go
+  /// on to the border or rim itself, but at most max_gap_px. No value if fewer than min_length_px
+  /// remain.
+  [[nodiscard]] std::optional<TracedLine> trace(const PlanarPiece& piece,
+                                                const std::vector<Eigen::Vector2f>& nodes);
 
-  static constexpr int kMinRunPx = 5;
+  /// Four rows of the last trace, from its first to its last point.
+  struct Quad {
+    Eigen::Vector3d ray;     // of the curve in the middle
+    Eigen::Vector3d across;  // change of the ray per px across the rows
+    float x, y;              // of the curve in the middle
+    float slope;             // px across per row
+    float perpendicular;     // px of distance per px across
+    EdgeResponse mean;
+    float turn;                     // change of the even response from row to row
+    std::array<float, 4> odd;       // by row, in the order of the walk
+    float offset_px, variance_px2;  // of the edge from the curve, across; of its noise
+    bool crosses_rows, is_edge;
+    int8_t way;  // of the walk along the rows, +1 or -1
+  };
+  [[nodiscard]] const std::vector<Quad>& quads() const { return quads_; }
+
+  static constexpr int kMinRunPx = 8;
+  static constexpr int kQuadPx = 4;
 
  private:
-  struct Step {
-    Eigen::Vector2d curve_px, crest_px;
-    Eigen::Vector3d ray;   // of the crest
-    double px_per_rad;     // along the curve's normal
-    float gx, gy, nx, ny;  // gradient at the curve, and the curve's normal
-    uint32_t pixel;        // of the crest
-    bool is_edge, along_x;
-    int8_t polarity;
-  };
   struct Front {
-    Eigen::Vector2d position, normal;  // on the curve; normal of the curve there
+    Eigen::Vector2d position;  // on the curve, at the border between two rows
+    bool crosses_rows = true;
+    bool has_slope = false;  // of the eight rows before, which crossed the same way
+    double slope = 0, bend = 0;
     bool ended = false;
     bool at_border = false;  // of the usable part of the image
   };
@@ -80,33 +87,34 @@ class LineTracer {
     Eigen::Vector3d ray;
   };
 
-  bool evaluate(const GradientField& field,
-                uint16_t min_magnitude,
-                double bound_px,
-                const Eigen::Vector2d& position,
-                const CurveOffset& curve,
-                Step* step) const;
-  void extend(const GradientField& field,
-              uint16_t min_magnitude,
-              double bound_px,
-              int direction,
-              std::vector<Step>* steps,
-              Front* front);
+  void measureNoise();
+  bool orient(Front* front) const;
+  bool evaluate(Front* front, int direction, std::array<Quad, 2>* quads) const;
+  void judge(Quad* quad) const;
+  void add(const Quad& quad);
+  void extend(int direction, std::vector<Quad>* quads, Front* front);
   bool refit();
-  [[nodiscard]] bool isArc(const std::vector<Step>& steps, const Eigen::Vector3d& normal) const;
-  [[nodiscard]] End endOf(const Step& last, int direction, bool at_border) const;
-  static void cutTail(std::vector<Step>* steps);
+  [[nodiscard]] bool isArc(const Eigen::Vector3d& normal) const;
+  [[nodiscard]] double scoreOf() const;
+  [[nodiscard]] int rowsOfEnd(size_t first, size_t last) const;
+  [[nodiscard]] End endOf(size_t first, size_t last, bool at_border) const;
+  static void cutTail(std::vector<Quad>* quads);
 
   const RayTable& rays_;
+  const BitRows* usable_ = nullptr;
   ValidationOptions options_;
-  std::vector<Step> forward_, backward_;
-  // The seed's points count until the end, so that the first few crests do not turn the plane.
+  EdgeProfiler profiler_;
+  GreyPixels pixels_;
+  ResponseNoise noise_;
+  float min_odd_narrow_ = 0, min_odd_wide_ = 0;
+
+  std::vector<Quad> quads_, forward_;
   RayMoments moments_;
   Eigen::Vector3d normal_;
+  bool wide_ = false;  // which filters judge
+  float bound_px_ = 1;
   int points_ = 0, points_at_fit_ = 0;
   double angle_rad_ = 0;
-  std::vector<uint32_t> crest_pixels_;
-  std::vector<uint8_t> crest_along_x_;
 };
 
 }  // namespace dlsd

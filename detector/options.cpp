@@ -36,7 +36,6 @@ void PolygonalChainOptions::check() const {
 void PlanarChainOptions::check() const {
   require("planes.seed_px", seed_px, 4, 1000);
   require("planes.max_err_px", max_err_px, 0, 100, false);
-  require("planes.max_outliers", max_outliers, 0, 100);
 }
 
 void ValidationOptions::check() const {
@@ -63,7 +62,6 @@ DetectorOptions DetectorOptions::paper() {
   options.edges.min_gradient = 3;
   options.edges.anchor_noise_ratio = 0;
   options.edges.min_noise_ratio = 0;
-  options.edges.subpixel = false;
   options.validation.rho_px = 4;
   return options;
 }

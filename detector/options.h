@@ -17,8 +17,7 @@ struct EdgeDrawingOptions {
   double min_noise_ratio = 2.2;
   int anchor_interval_px = 2;  ///< Rows and columns on which anchors are looked for. In [1, 64].
   int min_chain_px = 10;       ///< Shorter chains are dropped. In [2, 1000].
-  bool subpixel = true;  ///< Move chain pixels to the crest of the gradient along its direction.
-  void check() const;    ///< Throws std::invalid_argument naming field, value and range.
+  void check() const;          ///< Throws std::invalid_argument naming field, value and range.
 };
 
 /// Step 2 of the paper (4.2): straight pieces of a chain, grouped into smooth convex polygons.
@@ -33,10 +32,8 @@ struct PolygonalChainOptions {
 
 /// Step 2 of the default: pieces of a chain that lie in one plane through the optical centre.
 struct PlanarChainOptions {
-  int seed_px = 10;  ///< Pixels that start a piece. In [4, 1000].
-  double max_err_px =
-      1;  ///< A piece ends where pixels are farther from its plane's image. In (0, 100].
-  int max_outliers = 2;  ///< Consecutive farther pixels that do not end it. In [0, 100].
+  int seed_px = 10;       ///< Shorter pieces are dropped. In [4, 1000].
+  double max_err_px = 1;  ///< A chain is split where it is farther from a plane. In (0, 100].
   void check() const;
 };
 
@@ -49,7 +46,7 @@ struct ValidationOptions {
   int max_gap_px = 7;  ///< Steps without an edge that do not end the line. In [0, 1000].
   /// Edges that bend away from the plane's image with a smaller radius, by more than noise
   /// explains, are arcs of curved things. In [0, 1e9]; 0 switches the test off.
-  double min_bend_radius_px = 500;
+  double min_bend_radius_px = 1000;
   double min_length_px = 15;  ///< In [2, 10000].
   double min_score = 0;       ///< -log10 of the number of false alarms. In [-100, 1e6].
   void check() const;

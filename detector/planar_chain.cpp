@@ -1,61 +1,73 @@
 #include "detector/planar_chain.h"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
-#include <optional>
 
 namespace dlsd {
 
-void splitPlanar(const ChainRays& chain,
-                 const PlanarChainOptions& options,
-                 std::vector<PlanarPiece>* pieces) {
-  pieces->clear();
-  const int size = chain.size();
-  int previous_end = 0;
-  for (int begin = 0; begin + options.seed_px <= size;) {
-    int end = begin + options.seed_px;
-    std::optional<PlaneFit> fit = fitPlane(chain.moments.interval(begin, end));
-    bool planar = fit.has_value();
-    for (int i = begin; planar && i < end; ++i) {
-      planar = chain.errPx(i, fit->normal) <= options.max_err_px;
+/// Nodes first ... last.
+void PlanarSplitter::splitInterval(uint32_t first,
+                                   uint32_t last,
+                                   float px_per_node,
+                                   std::vector<PlanarPiece>* pieces) {
+  stack_.clear();
+  stack_.emplace_back(first, last);
+  while (!stack_.empty()) {
+    const auto [a, b] = stack_.back();
+    stack_.pop_back();
+    const int length_px = static_cast<int>(static_cast<float>(b - a + 1) * px_per_node + 0.5F);
+    if (b == a || length_px < options_.seed_px) continue;
+    const Eigen::Vector3f normal = node_rays_[a].ray.cross(node_rays_[b].ray).normalized();
+    float farthest_px = 0;
+    uint32_t at = a;
+    for (uint32_t i = a + 1; i < b; ++i) {
+      const float err_px = std::abs(node_rays_[i].ray.dot(normal)) * node_rays_[i].px_per_rad;
+      if (err_px > farthest_px) {
+        farthest_px = err_px;
+        at = i;
+      }
     }
-    if (!planar) {
-      begin += 2;
+    if (static_cast<double>(farthest_px) > options_.max_err_px) {
+      // The later half first onto the stack: pieces come out in the order of the chain.
+      stack_.emplace_back(at, b);
+      stack_.emplace_back(a, at);
       continue;
     }
-    // Refit each time the piece has grown by a quarter, and once more where it stops.
-    int fitted_end = end;
-    for (;;) {
-      const int refit_at = fitted_end + std::max(4, (fitted_end - begin) / 4);
-      int next = end;
-      for (int misses = 0; next < std::min(size, refit_at) && misses <= options.max_outliers;
-           ++next) {
-        if (chain.errPx(next, fit->normal) <= options.max_err_px) {
-          end = next + 1;
-          misses = 0;
-        } else {
-          ++misses;
-        }
-      }
-      if (end == fitted_end) break;
-      fit = fitPlane(chain.moments.interval(begin, end));
-      if (!fit) break;
-      fitted_end = end;
+    const Eigen::Vector3d exact =
+        node_rays_[a].ray.cast<double>().cross(node_rays_[b].ray.cast<double>());
+    const double norm = exact.norm();
+    if (!(norm > 0)) continue;
+    pieces->push_back({exact / norm, nodes_[(a + b) / 2].cast<double>(), length_px, a, b - a + 1});
+  }
+}
+
+void PlanarSplitter::split(const CrestChains& chains, std::vector<PlanarPiece>* pieces) {
+  pieces->clear();
+  nodes_.clear();
+  node_rays_.clear();
+  for (const CrestChains::Chain& chain : chains.chains) {
+    const auto first = static_cast<uint32_t>(nodes_.size());
+    const uint32_t count = std::max(2U, chain.size / kNodePx);
+    for (uint32_t i = 0; i < count; ++i) {
+      const uint32_t begin = i * chain.size / count, end = (i + 1) * chain.size / count;
+      uint32_t sum = 0;
+      for (uint32_t k = begin; k < end; ++k) sum += chains.across[chain.first + k];
+      const auto size = static_cast<float>(end - begin);
+      const float across = static_cast<float>(sum) / size;
+      const float along = static_cast<float>(chain.start) + static_cast<float>(begin + end - 1) / 2;
+      const Eigen::Vector2f p =
+          chain.crosses_rows ? Eigen::Vector2f(across, along) : Eigen::Vector2f(along, across);
+      const auto u = static_cast<double>(p.x()), v = static_cast<double>(p.y());
+      if (!rays_.covers(u, v)) continue;
+      const RaySample sample = rays_.at(u, v);
+      nodes_.push_back(p);
+      node_rays_.push_back({sample.ray.cast<float>(), static_cast<float>(sample.pxPerRad())});
     }
-    // Backwards into what earlier seeds skipped.
-    if (fit) {
-      const int seed_begin = begin;
-      while (begin > previous_end && chain.errPx(begin - 1, fit->normal) <= options.max_err_px) {
-        --begin;
-      }
-      if (begin < seed_begin) fit = fitPlane(chain.moments.interval(begin, end));
-    }
-    if (fit) {
-      const double weight = end - begin;
-      pieces->push_back({begin, end, fit->normal, std::sqrt(fit->squared_residuals / weight)});
-    }
-    previous_end = end;
-    begin = end;
+    const auto last = static_cast<uint32_t>(nodes_.size());
+    if (last < first + 2) continue;
+    splitInterval(
+        first, last - 1, static_cast<float>(chain.size) / static_cast<float>(last - first), pieces);
   }
 }
 

@@ -3,49 +3,51 @@
 // whatever the lens makes of them. The generalisation of the straight pieces of 4.2.
 
 #include <Eigen/Core>
-#include <span>
 #include <vector>
 
+#include "cameras/ray_table.h"
+#include "detector/edge_linking.h"
 #include "detector/options.h"
-#include "detector/plane_fit.h"
 
 namespace dlsd {
 
-/// Points of one chain: unit rays and the local scale, which turns angles to a plane into pixels.
-struct ChainRays {
-  std::vector<Eigen::Vector3d> rays;
-  std::vector<double> px_per_rad;
-  PrefixMoments moments;  ///< Weights px_per_rad^2: sums of squares are in px^2.
-
-  void clear() {
-    rays.clear();
-    px_per_rad.clear();
-    moments.clear();
-  }
-  void add(const Eigen::Vector3d& ray, double scale_px_per_rad) {
-    rays.push_back(ray);
-    px_per_rad.push_back(scale_px_per_rad);
-    moments.add(ray, scale_px_per_rad * scale_px_per_rad);
-  }
-  [[nodiscard]] int size() const { return static_cast<int>(rays.size()); }
-  [[nodiscard]] double errPx(int i, const Eigen::Vector3d& normal) const {
-    const size_t k = static_cast<size_t>(i);
-    return std::abs(rays[k].dot(normal)) * px_per_rad[k];
-  }
-};
-
-/// Points begin, ..., end - 1 of a chain.
+/// A piece of a chain: what a trace starts from.
 struct PlanarPiece {
-  int begin, end;
-  Eigen::Vector3d normal;
-  double rms_px;
+  Eigen::Vector3d normal;      ///< Of the plane through its ends.
+  Eigen::Vector2d start_px;    ///< On the chain, about the middle of the piece.
+  int length_px;               ///< Rows (columns) that it crosses.
+  uint32_t first_node, nodes;  ///< Its points among PlanarSplitter::nodes().
 };
 
-/// Pieces in the order of the chain, disjoint. Each starts from seed_px points within max_err_px of
-/// their plane and grows, refitting in O(1), until more than max_outliers consecutive points are
-/// farther from it.
-void splitPlanar(const ChainRays& chain,
-                 const PlanarChainOptions& options,
-                 std::vector<PlanarPiece>* pieces);
+class PlanarSplitter {
+ public:
+  PlanarSplitter(const RayTable& rays, const PlanarChainOptions& options)
+      : rays_(rays), options_(options) {}
+
+  /// Points of about kNodePx crests each are joined by planes; where a chain strays from the plane
+  /// through its ends by more than max_err_px, it is split at the farthest point, again and again.
+  void split(const CrestChains& chains, std::vector<PlanarPiece>* pieces);
+
+  /// Means of about kNodePx consecutive crests, chain by chain.
+  [[nodiscard]] const std::vector<Eigen::Vector2f>& nodes() const { return nodes_; }
+
+  static constexpr int kNodePx = 6;
+
+ private:
+  struct NodeRay {
+    Eigen::Vector3f ray;
+    float px_per_rad;
+  };
+  void splitInterval(uint32_t first,
+                     uint32_t last,
+                     float px_per_node,
+                     std::vector<PlanarPiece>* pieces);
+
+  const RayTable& rays_;
+  PlanarChainOptions options_;
+  std::vector<Eigen::Vector2f> nodes_;
+  std::vector<NodeRay> node_rays_;
+  std::vector<std::pair<uint32_t, uint32_t>> stack_;
+};
 
 }  // namespace dlsd

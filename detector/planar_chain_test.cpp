@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/Geometry>
 #include <cmath>
 
 #include "detector/test_scene.h"
@@ -9,67 +10,77 @@
 namespace dlsd {
 namespace {
 
-constexpr double kPxPerRad = 450;
-
-/// One ray per px along the great circles through the vertices, with noise across in px.
-ChainRays chainThrough(const std::vector<Eigen::Vector3d>& vertices,
-                       double noise_px,
-                       std::vector<int>* corners) {
-  ChainRays chain;
-  uint64_t k = 0;
-  for (size_t i = 0; i + 1 < vertices.size(); ++i) {
-    const auto arc = arcBetween(vertices[i], vertices[i + 1]);
-    const int count = static_cast<int>(arc->angle() * kPxPerRad);
-    for (int j = 0; j < count; ++j) {
-      const double shift = noise_px / kPxPerRad * test::gaussian(3, k++);
-      chain.add((arc->at(static_cast<double>(j) / count) + shift * arc->normal).normalized(),
-                kPxPerRad);
-    }
-    corners->push_back(chain.size());
-  }
-  return chain;
-}
-
+// The upper boundary of a polygon as seen by a fisheye camera, a whole pixel in every column: as
+// many pieces as sides, each with that side's plane.
 TEST(PlanarChain, SplitsWhereThePlaneChanges) {
-  const Eigen::Vector3d a(-0.5, 0.1, 1), b(0.2, 0.3, 0.9), c(0.5, -0.6, 0.2), d(0.4, -0.4, -0.5);
-  for (const double noise_px : {0.0, 0.2}) {
-    std::vector<int> corners;
-    const ChainRays chain = chainThrough({a, b, c, d}, noise_px, &corners);
-    std::vector<PlanarPiece> pieces;
-    splitPlanar(chain, PlanarChainOptions{}, &pieces);
-    ASSERT_EQ(pieces.size(), 3U);
-    const Eigen::Vector3d expected[] = {a.cross(b), b.cross(c), c.cross(d)};
-    int begin = 0;
-    for (size_t i = 0; i < 3; ++i) {
-      EXPECT_NEAR(pieces[i].begin, begin, 8);
-      EXPECT_NEAR(pieces[i].end, corners[i], 8);
-      EXPECT_LE(angleBetweenPlanes(pieces[i].normal, expected[i].normalized()), 2e-3);
-      EXPECT_LE(pieces[i].rms_px, 0.3);
-      begin = corners[i];
-    }
-  }
-}
-
-TEST(PlanarChain, OutliersDoNotEndAPiece) {
+  const Camera camera = test::testCameras()[2].camera;
+  const RayTable rays(camera);
+  const Eigen::Vector3d a(-0.8, -0.2, 1), b(-0.1, -0.5, 1), c(0.6, -0.45, 1), d(1.2, 0.1, 1);
+  const std::array<Eigen::Vector3d, 3> normals = {
+      a.cross(b).normalized(), b.cross(c).normalized(), c.cross(d).normalized()};
+  CrestChains chains;
+  const auto first = camera.project(a), last = camera.project(d);
+  ASSERT_TRUE(first && last);
   std::vector<int> corners;
-  ChainRays clean = chainThrough({{-0.5, 0.1, 1}, {0.4, 0.3, 0.9}}, 0, &corners);
-  ChainRays chain;
-  for (int i = 0; i < clean.size(); ++i) {
-    Eigen::Vector3d ray = clean.rays[static_cast<size_t>(i)];
-    if (i % 50 == 30) ray = (ray + Eigen::Vector3d(0, 5 / kPxPerRad, 0)).normalized();
-    chain.add(ray, kPxPerRad);
+  for (const Eigen::Vector3d& corner : {b, c}) {
+    corners.push_back(static_cast<int>(camera.project(corner)->x()));
   }
+  const int begin = static_cast<int>(first->x()) + 1, end = static_cast<int>(last->x());
+  for (int x = begin; x < end; ++x) {
+    const size_t side = x < corners[0] ? 0 : x < corners[1] ? 1 : 2;
+    // Where the plane's image crosses the column.
+    double low = 0, high = camera.height() - 1;
+    for (int i = 0; i < 50; ++i) {
+      const double y = (low + high) / 2;
+      const bool above = camera.unproject({double(x), y})->dot(normals[side]) *
+                             camera.unproject({double(x), 0.0})->dot(normals[side]) >
+                         0;
+      (above ? low : high) = y;
+    }
+    chains.across.push_back(static_cast<uint16_t>(std::lround(low)));
+  }
+  chains.chains.push_back(
+      {0, static_cast<uint32_t>(chains.across.size()), static_cast<uint16_t>(begin), false});
+  PlanarSplitter splitter(rays, {});
   std::vector<PlanarPiece> pieces;
-  splitPlanar(chain, PlanarChainOptions{}, &pieces);
-  ASSERT_EQ(pieces.size(), 1U);
-  EXPECT_EQ(pieces[0].begin, 0);
-  EXPECT_EQ(pieces[0].end, chain.size());
+  splitter.split(chains, &pieces);
+  // Corners are cut, which may make pieces of their own. The long ones are the sides.
+  std::array<int, 3> length_px{};
+  for (const PlanarPiece& piece : pieces) {
+    if (piece.length_px < 40) continue;
+    size_t side = 0;
+    for (size_t i = 1; i < 3; ++i) {
+      if (angleBetweenPlanes(piece.normal, normals[i]) <
+          angleBetweenPlanes(piece.normal, normals[side])) {
+        side = i;
+      }
+    }
+    EXPECT_LE(angleBetweenPlanes(piece.normal, normals[side]), 0.03);
+    const RaySample sample = rays.at(piece.start_px.x(), piece.start_px.y());
+    EXPECT_LE(std::abs(sample.ray.dot(normals[side])) * sample.pxPerRad(), 1.5);
+    length_px[side] += piece.length_px;
+  }
+  EXPECT_GE(length_px[0], 0.85 * (corners[0] - begin));
+  EXPECT_GE(length_px[1], 0.85 * (corners[1] - corners[0]));
+  EXPECT_GE(length_px[2], 0.85 * (end - corners[1]));
+  splitter.split({}, &pieces);
+  EXPECT_TRUE(pieces.empty());
 }
 
-TEST(PlanarChain, ShortChainsGiveNothing) {
-  std::vector<PlanarPiece> pieces(3);
-  splitPlanar(ChainRays{}, PlanarChainOptions{}, &pieces);
-  EXPECT_TRUE(pieces.empty());
+TEST(PlanarChain, ShortPiecesAreDropped) {
+  const Camera camera = test::testCameras()[0].camera;
+  const RayTable rays(camera);
+  const auto pieces = [&](int length) {
+    CrestChains chains;
+    chains.across.assign(static_cast<size_t>(length), 200);
+    chains.chains.push_back({0, static_cast<uint32_t>(length), 100, true});
+    PlanarSplitter splitter(rays, {.seed_px = 12});
+    std::vector<PlanarPiece> out;
+    splitter.split(chains, &out);
+    return out.size();
+  };
+  EXPECT_EQ(pieces(11), 0U);
+  EXPECT_EQ(pieces(12), 1U);
 }
 
 }  // namespace

@@ -133,4 +133,27 @@ std::optional<PlaneFit> fitPlane(std::span<const Eigen::Vector3d> rays) {
   return fitWithOwnAxis(M, frame);
 }
 
+std::optional<Eigen::Vector3d> refinePlane(const RayMoments& moments,
+                                           const Eigen::Vector3d& normal) {
+  const Eigen::Matrix3d M = moments.matrix();
+  // Tangent directions: along the rays as far as that lies in the plane, and across.
+  const Eigen::Vector3d column = M.col(0).squaredNorm() > M.col(1).squaredNorm()
+                                     ? Eigen::Vector3d(M.col(0))
+                                     : Eigen::Vector3d(M.col(1));
+  const Eigen::Vector3d larger =
+      column.squaredNorm() > M.col(2).squaredNorm() ? column : Eigen::Vector3d(M.col(2));
+  Eigen::Vector3d a = larger - larger.dot(normal) * normal;
+  const double length = a.norm();
+  if (!(length > 0)) return std::nullopt;
+  a /= length;
+  const Eigen::Vector3d b = normal.cross(a);
+  const Eigen::Vector3d Ma = M * a, Mb = M * b;
+  const double aa = a.dot(Ma), ab = a.dot(Mb), bb = b.dot(Mb);
+  const double determinant = aa * bb - ab * ab;
+  if (!(determinant > 1e-13 * aa * aa)) return std::nullopt;
+  const double an = normal.dot(Ma), bn = normal.dot(Mb);
+  const double x = (ab * bn - bb * an) / determinant, y = (ab * an - aa * bn) / determinant;
+  return (normal + x * a + y * b).normalized();
+}
+
 }  // namespace dlsd

@@ -5,12 +5,10 @@
 #include <Eigen/Core>
 #include <optional>
 #include <span>
-#include <vector>
 
 namespace dlsd {
 
-/// M (six numbers) and the sum of the weights. Sums of disjoint sets of rays add; differences of
-/// prefix sums are those of an interval.
+/// M (six numbers) and the sum of the weights. Sums of disjoint sets of rays add.
 struct RayMoments {
   double xx = 0, xy = 0, xz = 0, yy = 0, yz = 0, zz = 0, weight = 0;
 
@@ -23,26 +21,6 @@ struct RayMoments {
     yz += wy * ray.z();
     zz += wz * ray.z();
     weight += w;
-  }
-  RayMoments& operator+=(const RayMoments& m) {
-    xx += m.xx;
-    xy += m.xy;
-    xz += m.xz;
-    yy += m.yy;
-    yz += m.yz;
-    zz += m.zz;
-    weight += m.weight;
-    return *this;
-  }
-  RayMoments& operator-=(const RayMoments& m) {
-    xx -= m.xx;
-    xy -= m.xy;
-    xz -= m.xz;
-    yy -= m.yy;
-    yz -= m.yz;
-    zz -= m.zz;
-    weight -= m.weight;
-    return *this;
   }
   [[nodiscard]] Eigen::Matrix3d matrix() const {
     Eigen::Matrix3d m;
@@ -62,8 +40,8 @@ struct PlaneFit {
 /// From sums in any frame. No value if the rays span fewer than two directions (second singular
 /// value of the rays <= 3e-7 of the first) or their weight is not positive and finite. |n - exact|
 /// <= 1e-14 / s^2 for exact input, s^2 = second over first eigenvalue of M, about arc^2 / 12 for an
-/// arc (rad); an interval of prefix sums loses also the ratio of the whole sum to the interval's.
-/// Arcs of 10 px at 450 px / rad: 3e-10 rad, in a chain of 1000 px 3e-8 rad.
+/// arc (rad).
+/// Arcs of 10 px at 450 px / rad: 3e-10 rad.
 [[nodiscard]] std::optional<PlaneFit> fitPlane(const RayMoments& moments);
 
 /// From unit rays, in any order, N >= 2. Sums are taken about the rays' mean, which leaves no
@@ -71,24 +49,10 @@ struct PlaneFit {
 /// than two directions (second singular value <= 1e-9 of the first).
 [[nodiscard]] std::optional<PlaneFit> fitPlane(std::span<const Eigen::Vector3d> rays);
 
-/// Prefix sums: the moments of any interval of a sequence of rays in O(1).
-class PrefixMoments {
- public:
-  void clear() { sums_.assign(1, {}); }
-  void add(const Eigen::Vector3d& ray, double weight) {
-    sums_.push_back(sums_.back());
-    sums_.back().add(ray, weight);
-  }
-  /// Rays begin, ..., end - 1.
-  [[nodiscard]] RayMoments interval(int begin, int end) const {
-    RayMoments m = sums_[static_cast<size_t>(end)];
-    m -= sums_[static_cast<size_t>(begin)];
-    return m;
-  }
-  [[nodiscard]] int size() const { return static_cast<int>(sums_.size()) - 1; }
-
- private:
-  std::vector<RayMoments> sums_{RayMoments{}};
-};
+/// One Gauss-Newton step from a normal near the best: for rays within an angle e of a plane near
+/// `normal` what is left of the error is of order e^2. No value if the rays span fewer than two
+/// directions.
+[[nodiscard]] std::optional<Eigen::Vector3d> refinePlane(const RayMoments& moments,
+                                                         const Eigen::Vector3d& normal);
 
 }  // namespace dlsd

@@ -133,23 +133,26 @@ TEST(PlaneFit, TwoRaysGiveTheirCrossProduct) {
   EXPECT_GE(fit->normal.x(), 0);
 }
 
-TEST(PlaneFit, IntervalsOfPrefixSumsEqualDirectSums) {
-  // A chain of 1000 px at 450 px / rad; intervals from 10 px on.
-  const ExactArc arc = exactArc(11, 1000.0 / 450, 1001);
-  PrefixMoments prefix;
-  for (const auto& ray : arc.rays) prefix.add(ray, 450.0 * 450);
-  EXPECT_EQ(prefix.size(), 1001);
-  int fits = 0;
-  for (int begin = 0; begin + 10 <= 1001; begin += 37) {
-    for (const int length : {10, 30, 300}) {
-      if (begin + length > 1001) continue;
-      const auto fit = fitPlane(prefix.interval(begin, begin + length));
-      ASSERT_TRUE(fit);
-      EXPECT_LE(normalError(fit->normal, arc.normal), length == 10 ? 3e-8 : 3e-9);
-      ++fits;
+TEST(PlaneFit, OneStepFromNearbyIsTheBestPlane) {
+  for (const double arc_rad : {0.03, 0.3, 2.0}) {
+    const ExactArc arc = exactArc(11, arc_rad, 60);
+    RayMoments moments;
+    for (size_t i = 0; i < arc.rays.size(); ++i) {
+      moments.add((arc.rays[i] + 1e-4 * gaussian(5, i) * arc.normal).normalized(), 450.0 * 450);
     }
+    const auto best = fitPlane(moments);
+    ASSERT_TRUE(best);
+    // 2e-3 rad: 1 px at 450 px / rad, along the plane's tangents.
+    const Eigen::Vector3d a = arc.normal.unitOrthogonal();
+    const auto refined = refinePlane(moments, (arc.normal + 2e-3 * a).normalized());
+    ASSERT_TRUE(refined);
+    EXPECT_LE(normalError(*refined, best->normal), 1e-5) << arc_rad;
+    EXPECT_NEAR(refined->norm(), 1, 1e-12);
   }
-  EXPECT_GT(fits, 60);
+  RayMoments one;
+  one.add(Eigen::Vector3d::UnitZ(), 1);
+  EXPECT_FALSE(refinePlane(one, Eigen::Vector3d::UnitX()));
+  EXPECT_FALSE(refinePlane(RayMoments{}, Eigen::Vector3d::UnitX()));
 }
 
 TEST(PlaneFit, InverseInPlaneIsTheCovarianceOfTheNormal) {

@@ -116,8 +116,8 @@ inline Scene randomScene(uint64_t seed, int polygons, int cones, double max_angl
   return scene;
 }
 
-/// Box filter over the pixel (6 x 6 samples where shapes meet), then optical blur. Pixels without a
-/// ray are black.
+/// Box filter over the pixel (8 x 8 samples where shapes meet), then optical blur. Pixels without
+/// a ray are black.
 inline std::vector<float> render(const Scene& scene, const Camera& camera, double blur_px = 0.7) {
   const int w = camera.width(), h = camera.height();
   constexpr int kNoRay = -2;
@@ -145,7 +145,7 @@ inline std::vector<float> render(const Scene& scene, const Camera& camera, doubl
       double sum = greyOf(shapes[at(x, y)]);
       if (!same) {
         sum = 0;
-        constexpr int kSub = 6;
+        constexpr int kSub = 8;
         for (int j = 0; j < kSub; ++j) {
           for (int i = 0; i < kSub; ++i) {
             sum += greyOf(shapeOf(x + (i + 0.5) / kSub - 0.5, y + (j + 0.5) / kSub - 0.5));

@@ -1,0 +1,141 @@
+#include "detector/plane_detector.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "detector/stop_watch.h"
+#include "detector/visible_arc.h"
+
+namespace dlsd {
+namespace {
+
+/// A step of contrast c seen through little blur has a gradient of this times c in the edge map.
+constexpr double kGradientPerContrast = 0.28;
+
+const EdgeRowKernels& fastestEdgeRowKernels() {
+  const EdgeRowKernels* avx2 = avx2EdgeRowKernels();
+  return avx2 != nullptr ? *avx2 : portableEdgeRowKernels();
+}
+
+}  // namespace
+
+PlaneDetector::PlaneDetector(const RayTable& rays, const DetectorOptions& options)
+    : rays_(rays),
+      options_(options),
+      mapper_(
+          rays.camera().width(), rays.camera().height(), options.edges, fastestEdgeRowKernels()),
+      linker_(rays.camera().width(), options.edges),
+      splitter_(rays, options.planes),
+      tracer_(rays, options.validation),
+      claimed_(rays.camera().width(), rays.camera().height()) {}
+
+void PlaneDetector::loadPixels(const ImageView& image) {
+  pixels_ = {};
+  pixels_.width = image.width;
+  pixels_.height = image.height;
+  if (image.type == PixelType::kU8 && image.channels == 1) {
+    pixels_.u8 = static_cast<const uint8_t*>(image.data);
+    pixels_.stride = image.stride_bytes;
+    return;
+  }
+  const size_t w = static_cast<size_t>(image.width);
+  fixed_.resize(w * static_cast<size_t>(image.height));
+  for (int y = 0; y < image.height; ++y) loadGreyRow(image, y, &fixed_[static_cast<size_t>(y) * w]);
+  pixels_.fixed = fixed_.data();
+  pixels_.stride = image.width;
+}
+
+/// Calls f(x, y) for the pixels on the curve in four rows.
+template <class F>
+void forRows(const LineTracer::Quad& quad, F&& f) {
+  for (int i = 0; i < LineTracer::kQuadPx; ++i) {
+    const float ahead = static_cast<float>(i) - 1.5F;
+    const float x = quad.crosses_rows ? quad.x + ahead * quad.slope : quad.x + ahead;
+    const float y = quad.crosses_rows ? quad.y + ahead : quad.y + ahead * quad.slope;
+    f(static_cast<int>(std::floor(x + 0.5F)), static_cast<int>(std::floor(y + 0.5F)));
+  }
+}
+
+bool PlaneDetector::isClaimed(const PlanarPiece& piece) const {
+  uint32_t claimed = 0;
+  for (uint32_t i = 0; i < piece.nodes; ++i) {
+    const Eigen::Vector2f& p = splitter_.nodes()[piece.first_node + i];
+    claimed += claimed_.contains(static_cast<int>(p.x() + 0.5F), static_cast<int>(p.y() + 0.5F));
+  }
+  return 2 * claimed >= piece.nodes;
+}
+
+bool PlaneDetector::mostlyClaimed() const {
+  size_t claimed = 0;
+  for (const LineTracer::Quad& q : tracer_.quads()) {
+    claimed += claimed_.contains(static_cast<int>(q.x + 0.5F), static_cast<int>(q.y + 0.5F));
+  }
+  return 2 * claimed >= tracer_.quads().size();
+}
+
+void PlaneDetector::claim() {
+  for (const LineTracer::Quad& q : tracer_.quads()) {
+    if (!q.is_edge) continue;
+    forRows(q, [&](int x, int y) {
+      for (int side = -1; side <= 1; ++side) {
+        const int cx = q.crosses_rows ? x + side : x, cy = q.crosses_rows ? y : y + side;
+        if (cx >= 0 && cy >= 0 && cx < claimed_.width && cy < claimed_.height) {
+          claimed_.set(cx, cy);
+        }
+      }
+    });
+  }
+}
+
+void PlaneDetector::traceAll(std::vector<DetectedLine>* lines) {
+  const ValidationOptions& v = options_.validation;
+  order_.resize(pieces_.size());
+  for (size_t i = 0; i < pieces_.size(); ++i) order_[i] = static_cast<uint32_t>(i);
+  std::sort(order_.begin(), order_.end(), [&](uint32_t a, uint32_t b) {
+    const int length_a = pieces_[a].length_px, length_b = pieces_[b].length_px;
+    return length_a != length_b ? length_a > length_b : a < b;
+  });
+  std::fill(claimed_.words.begin(), claimed_.words.end(), uint64_t{0});
+  for (const uint32_t index : order_) {
+    const PlanarPiece& piece = pieces_[index];
+    if (isClaimed(piece)) continue;
+    const auto traced = tracer_.trace(piece, splitter_.nodes());
+    if (!traced || traced->score < v.min_score || traced->is_arc || mostlyClaimed()) continue;
+    const auto arc = visibleArc(
+        rays_.camera(), traced->fit.normal, traced->from_ray, traced->middle_ray, traced->to_ray);
+    if (!arc) continue;
+    claim();
+    DetectedLine& line = lines->emplace_back();
+    line.arc = *arc;
+    line.rms_px = traced->rms_px;
+    line.max_px = traced->max_px;
+    line.length_px = traced->length_px;
+    line.score = traced->score;
+    line.polarity = traced->polarity;
+    line.normal_cov = traced->fit.inverse_in_plane * traced->variance_factor;
+  }
+}
+
+void PlaneDetector::detect(const ImageView& image,
+                           const BitRows& usable,
+                           std::vector<DetectedLine>* lines,
+                           StageTimes* times) {
+  {
+    const StopWatch stage(&times->gradient);
+    loadPixels(image);
+    mapper_.compute(pixels_, usable, &map_);
+  }
+  {
+    const StopWatch stage(&times->linking);
+    linker_.link(&map_, &chains_);
+  }
+  {
+    const StopWatch stage(&times->planes);
+    splitter_.split(chains_, &pieces_);
+  }
+  const StopWatch stage(&times->validation);
+  tracer_.setImage(pixels_, usable, options_.edges.min_gradient / kGradientPerContrast);
+  traceAll(lines);
+}
+
+}  // namespace dlsd

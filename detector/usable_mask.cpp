@@ -1,0 +1,54 @@
+#include "detector/usable_mask.h"
+
+#include <algorithm>
+
+#include "cameras/batch.h"
+
+namespace dlsd {
+namespace {
+
+/// Distance along a row to the nearest entry that is set; `far` where that is farther or there is
+/// none.
+void distanceAlong(const uint8_t* set, uint8_t* distance, int count, uint8_t far) {
+  const auto sweep = [&](int begin, int step, bool first) {
+    uint8_t d = far;
+    for (int n = 0, i = begin; n < count; ++n, i += step) {
+      d = set[i] != 0 ? uint8_t{0} : static_cast<uint8_t>(std::min<int>(d + 1, far));
+      distance[i] = first ? d : std::min(distance[i], d);
+    }
+  };
+  sweep(0, 1, true);
+  sweep(count - 1, -1, false);
+}
+
+}  // namespace
+
+UsableMask::UsableMask(const Camera& camera) : bits_(camera.width(), camera.height()) {
+  const int width = camera.width(), height = camera.height();
+  const size_t w = static_cast<size_t>(width);
+  std::vector<double> u(w), v(w), x(w), y(w), z(w);
+  std::vector<uint8_t> valid(w), has_no_ray(w);
+  std::vector<uint8_t> row_distance(w * static_cast<size_t>(height));
+  for (size_t i = 0; i < w; ++i) u[i] = static_cast<double>(i);
+  for (int row = 0; row < height; ++row) {
+    std::fill(v.begin(), v.end(), row);
+    unprojectAll(camera, u, v, x, y, z, valid);
+    for (size_t i = 0; i < w; ++i) has_no_ray[i] = static_cast<uint8_t>(valid[i] == 0);
+    distanceAlong(
+        has_no_ray.data(), &row_distance[static_cast<size_t>(row) * w], width, kRimPx + 1);
+  }
+  for (int row = kBorderPx; row < height - kBorderPx; ++row) {
+    for (int column = kBorderPx; column < width - kBorderPx; ++column) {
+      bool near_rim = false;
+      for (int dy = -kRimPx; dy <= kRimPx && !near_rim; ++dy) {
+        if (row + dy < 0 || row + dy >= height) continue;
+        const int dx =
+            row_distance[static_cast<size_t>(row + dy) * w + static_cast<size_t>(column)];
+        near_rim = dx * dx + dy * dy <= kRimPx * kRimPx;
+      }
+      if (!near_rim) bits_.set(column, row);
+    }
+  }
+}
+
+}  // namespace dlsd
