@@ -749,7 +749,7 @@ void expectSameImages(const std::function<std::pair<Camera, Camera>()>& draw_pai
     for (const Vector3d& ray : many(genRayFor(a))) {
       if (atBound(a, ray)) continue;
       const auto pa = a.project(ray), pb = b.project(ray);
-      if (pa && pa->cwiseAbs().maxCoeff() > 1e5) continue;
+      if (pa && pa->cwiseAbs().maxCoeff() > 1e4) continue;
       if (pa.has_value() != pb.has_value()) RC_FAIL(describe(a, ray) + "\n" + describe(b, ray));
       if (!pa) continue;
       const double error = (*pa - *pb).norm();
