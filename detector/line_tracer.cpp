@@ -32,9 +32,13 @@ Eigen::Vector3d projected(const Eigen::Vector3d& ray, const Eigen::Vector3d& nor
 LineTracer::LineTracer(const RayTable& rays, const ValidationOptions& options)
     : rays_(rays), options_(options) {}
 
-void LineTracer::setImage(const GreyPixels& pixels, const BitRows& usable, double min_contrast) {
+void LineTracer::setImage(const GreyPixels& pixels,
+                          const BitRows& usable,
+                          const BitRows& seen,
+                          double min_contrast) {
   pixels_ = pixels;
   usable_ = &usable;
+  seen_ = &seen;
   profiler_.setPixels(pixels);
   measureNoise();
   const auto floor = static_cast<float>(min_contrast);
@@ -258,7 +262,8 @@ void LineTracer::extend(int direction, std::vector<Quad>* quads, Front* front) {
       const int x = static_cast<int>(std::floor(static_cast<double>(q.x) + 0.5));
       const int y = static_cast<int>(std::floor(static_cast<double>(q.y) + 0.5));
       if (!usable_->contains(x, y)) {
-        front->ended = front->at_border = true;
+        front->ended = true;
+        front->at_border = !seen_->contains(x, y);
         break;
       }
       if (!last_ray.isZero()) angle_rad_ += (q.ray - last_ray).norm();
@@ -555,6 +560,8 @@ std::optional<TracedLine> LineTracer::trace(const PlanarPiece& piece,
   line.score = scoreOf();
   const End from = endOf(last, 0, back.at_border);
   const End to = endOf(0, last, front.at_border);
+  // Each part of the curve is near a usable pixel.
+  line.is_inside = !back.at_border && !front.at_border;
   line.from_ray = from.ray;
   line.to_ray = to.ray;
   line.middle_ray = quads_[quads_.size() / 2].ray;
