@@ -4,6 +4,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
+#include <optional>
+#include <tuple>
 #include <utility>
 
 namespace dlsd {
@@ -11,6 +14,10 @@ namespace {
 
 constexpr double kDeg = M_PI / 180;
 constexpr double kRise = 1.5;
+/// A great circle this near to a pole of a panorama (rad) goes through it, and is cut kPoleGap
+/// before and behind: nearer, rounding decides the longitude.
+constexpr double kAtPole = 1e-14;
+constexpr double kPoleGap = 1e-8;
 
 /// An arc with everything that Arc::at needs worked out once.
 class ArcSampler {
@@ -27,9 +34,23 @@ class ArcSampler {
   [[nodiscard]] const Eigen::Vector3d& from() const { return from_; }
   [[nodiscard]] const Eigen::Vector3d& side() const { return side_; }
   /// t: fraction of the angle.
-  [[nodiscard]] Eigen::Vector3d at(double t) const {
-    const double phi = t * angle_;
+  [[nodiscard]] Eigen::Vector3d at(double t) const { return atAngle(t * angle_); }
+  [[nodiscard]] Eigen::Vector3d atAngle(double phi) const {
     return std::cos(phi) * from_ + std::sin(phi) * side_;
+  }
+
+  /// Angles phi in [0, angle] at which a from_value cos(phi) + side_value sin(phi) is `value`.
+  template <class Take>
+  void solve(double from_value, double side_value, double value, const Take& take) const {
+    const double amplitude = std::hypot(from_value, side_value);
+    if (!(std::abs(value) <= amplitude) || !(amplitude > 0)) return;
+    const double top = std::atan2(side_value, from_value);
+    const double half = std::acos(value / amplitude);
+    for (const double phi : {top - half, top + half}) {
+      for (const double turn : {-2 * M_PI, 0.0, 2 * M_PI}) {
+        if (phi + turn >= 0 && phi + turn <= angle_) take(phi + turn);
+      }
+    }
   }
 
  private:
@@ -37,9 +58,69 @@ class ArcSampler {
   double angle_;
 };
 
+/// The same for one piece of an arc on a panorama, between cuts: there the sign of x must be right
+/// to the last bit, for behind the camera it says on which side of the image the ray is.
+class SeamedSampler {
+ public:
+  SeamedSampler(const Arc& arc, double t0, double t1) : arc_(arc) {
+    // x(phi) = slope_ sin(phi - zero_), zero_ in [0, pi).
+    const double from = arc_.from().x(), side = arc_.side().x();
+    zero_ = std::atan2(-from, side);
+    slope_ = std::hypot(from, side);
+    if (zero_ < 0) {
+      zero_ += M_PI;
+      slope_ = -slope_;
+    }
+    middle_ = (t0 + t1) / 2 * arc_.angle();
+    on_seam_ = slope_ == 0 ? 0.0
+                           : std::copysign(std::numeric_limits<double>::min(),
+                                           slope_ * std::sin(middle_ - zero_));
+    through_poles_ = std::abs(arc_.from().cross(arc_.side()).y()) <= kAtPole;
+    pole_ = std::atan2(arc_.side().y(), arc_.from().y());
+    if (pole_ < 0) pole_ += M_PI;
+  }
+
+  [[nodiscard]] double angle() const { return arc_.angle(); }
+  /// Angles in [0, pi) at which the arc must be cut: where it meets the seam, and a pole.
+  [[nodiscard]] std::optional<double> seamCut() const {
+    if (slope_ == 0 || !(arc_.atAngle(zero_).z() < 0)) return std::nullopt;
+    if (through_poles_ && std::abs(std::remainder(zero_ - pole_, M_PI)) < kPoleGap) {
+      return std::nullopt;
+    }
+    return zero_;
+  }
+  [[nodiscard]] std::optional<double> poleCut() const {
+    return through_poles_ ? std::optional(pole_) : std::nullopt;
+  }
+
+  [[nodiscard]] Eigen::Vector3d at(double t) const {
+    double phi = t * arc_.angle();
+    if (through_poles_) {
+      const double off = std::remainder(phi - pole_, M_PI);
+      if (std::abs(off) < kPoleGap) {
+        const double pole = phi - off;
+        phi = middle_ < pole ? pole - kPoleGap : pole + kPoleGap;
+      }
+    }
+    Eigen::Vector3d ray = arc_.atAngle(phi);
+    const double off = phi - zero_;
+    ray.x() = std::abs(off) <= 1e-15 * arc_.angle() ? on_seam_ : slope_ * std::sin(off);
+    return ray;
+  }
+
+ private:
+  ArcSampler arc_;
+  double zero_, slope_;
+  double middle_;   ///< Of the piece.
+  double on_seam_;  ///< x at zero_: next to nothing, on the piece's side.
+  bool through_poles_;
+  double pole_;  ///< Where |y| is largest, in [0, pi).
+};
+
 enum class Where { kInside, kOutsideImage, kOutsideDomain };
 
-Where whereIs(const Camera& camera, const ArcSampler& arc, double t) {
+template <class Sampler>
+Where whereIs(const Camera& camera, const Sampler& arc, double t) {
   const auto pixel = camera.project(arc.at(t));
   if (!pixel) return Where::kOutsideDomain;
   return camera.inImage(*pixel) ? Where::kInside : Where::kOutsideImage;
@@ -56,8 +137,7 @@ struct Probe {
 
 Probe probe(const Camera& camera, const ArcSampler& arc, double max_field_angle, double t) {
   const Eigen::Vector3d ray = arc.at(t);
-  const double theta = std::atan2(std::sqrt(ray.x() * ray.x() + ray.y() * ray.y()), ray.z());
-  Probe p{t, Where::kOutsideDomain, std::abs(max_field_angle - theta), 0, 0};
+  Probe p{t, Where::kOutsideDomain, std::abs(max_field_angle - fieldAngle(ray)), 0, 0};
   const auto pixel = camera.project(ray);
   if (!pixel) return p;
   const ProjectionJacobian J = std::visit(
@@ -87,20 +167,6 @@ bool nothingBetween(const Probe& a, const Probe& b, double length_rad) {
   return a.border_px + b.border_px > kRise * std::max(a.scale, b.scale) * length_rad;
 }
 
-/// Angle to +z beyond which nothing is imaged. The models turn away from the axis as a pixel's
-/// ((u - cx) / fx, (v - cy) / fy) gets longer, so the image's corners look furthest.
-double imageFieldAngle(const Camera& camera) {
-  double largest = 0;
-  for (const double u : {-0.5, camera.width() - 0.5}) {
-    for (const double v : {-0.5, camera.height() - 0.5}) {
-      const auto ray = camera.unproject({u, v});
-      if (!ray) return camera.maxFieldAngle();
-      largest = std::max(largest, std::atan2(std::hypot(ray->x(), ray->y()), ray->z()));
-    }
-  }
-  return largest;
-}
-
 /// Pieces of [0, 1] in which the arc is at most cone_rad from +z, with a little to spare.
 std::vector<std::pair<double, double>> insideCone(const ArcSampler& arc, double cone_rad) {
   constexpr double kSpare = 1e-6;
@@ -127,8 +193,9 @@ std::vector<std::pair<double, double>> insideCone(const ArcSampler& arc, double 
 }
 
 /// Between t_in (inside) and t_out (outside), the last t that is inside.
+template <class Sampler>
 double lastInside(
-    const Camera& camera, const ArcSampler& arc, double t_in, double t_out, Where* outside) {
+    const Camera& camera, const Sampler& arc, double t_in, double t_out, Where* outside) {
   *outside = whereIs(camera, arc, t_out);
   while (std::abs(t_out - t_in) > 1e-13) {
     const double t = t_in + (t_out - t_in) / 2;
@@ -159,8 +226,9 @@ double distanceToChord(const Eigen::Vector2d& p,
 
 /// Appends the points between p0 and p1 (exclusive) that keep the curve within tolerance of its
 /// chords, judged by the middle of each piece.
+template <class Sampler>
 void refine(const Camera& camera,
-            const ArcSampler& arc,
+            const Sampler& arc,
             double t0,
             const Eigen::Vector2d& p0,
             double t1,
@@ -176,6 +244,147 @@ void refine(const Camera& camera,
   refine(camera, arc, tm, *pm, t1, p1, tolerance, depth - 1, out);
 }
 
+/// imageCurve with the sampler that the camera needs, judged by the middles of pieces.
+template <class Sampler>
+std::vector<Eigen::Vector2d> curveOf(
+    const Camera& camera, const Sampler& sampler, double t0, double t1, double tolerance) {
+  std::vector<Eigen::Vector2d> points;
+  points.reserve(64);
+  // Four pieces to start from, each looked at in three inner points, so that a long S-shaped curve
+  // is never taken for a straight one.
+  constexpr int kPieces = 4, kInner = 4;
+  std::array<std::optional<Eigen::Vector2d>, kPieces * kInner + 1> coarse;
+  const auto coarse_t = [&](size_t i) {
+    return i + 1 == coarse.size() ? t1
+                                  : t0 + (t1 - t0) * static_cast<double>(i) / (kPieces * kInner);
+  };
+  for (size_t i = 0; i < coarse.size(); ++i) coarse[i] = camera.project(sampler.at(coarse_t(i)));
+
+  std::optional<Eigen::Vector2d> left;
+  double t_left = t0;
+  // Continues the curve to the point at t; the piece is cut in `parts` at once, then refined.
+  const auto extend = [&](double t, const std::optional<Eigen::Vector2d>& p, int parts) {
+    if (!p) return;
+    const double t_begin = t_left;
+    for (int i = 1; i <= parts; ++i) {
+      const double t_next = i == parts ? t : t_begin + (t - t_begin) * i / parts;
+      const auto next = i == parts ? p : camera.project(sampler.at(t_next));
+      if (!next) continue;
+      if (left) {
+        refine(camera, sampler, t_left, *left, t_next, *next, tolerance, 16, &points);
+      }
+      points.push_back(*next);
+      left = next;
+      t_left = t_next;
+    }
+  };
+  extend(t0, coarse[0], 1);
+  for (size_t i = 0; i + 1 < coarse.size(); i += kInner) {
+    const bool complete =
+        coarse[i] && coarse[i + 1] && coarse[i + 2] && coarse[i + 3] && coarse[i + 4];
+    double bend = 0;
+    for (size_t j = 1; complete && j < kInner; ++j) {
+      bend = std::max(bend, distanceToChord(*coarse[i + j], *coarse[i], *coarse[i + kInner]));
+    }
+    if (!complete) {
+      for (size_t j = 1; j <= kInner; ++j) extend(coarse_t(i + j), coarse[i + j], 1);
+    } else if (bend <= tolerance) {
+      points.push_back(*coarse[i + kInner]);
+      left = coarse[i + kInner];
+      t_left = coarse_t(i + kInner);
+    } else {
+      // The distance to the chord falls with the square of the number of parts.
+      const double parts = std::ceil(std::sqrt(1.1 * bend / tolerance));
+      extend(coarse_t(i + kInner), coarse[i + kInner], static_cast<int>(std::min(parts, 1e3)));
+    }
+  }
+  return points;
+}
+
+/// lo, hi and the angles between them at which an arc on a panorama must be cut, in order.
+std::vector<double> cutsBetween(const Arc& arc, double lo, double hi) {
+  std::vector<double> cuts{lo, hi};
+  const SeamedSampler sampler(arc, 0, 1);
+  for (const auto& cut : {sampler.seamCut(), sampler.poleCut()}) {
+    if (cut && *cut > lo && *cut < hi) cuts.push_back(*cut);
+  }
+  std::sort(cuts.begin(), cuts.end());
+  return cuts;
+}
+
+/// imageSpans of a panorama: its borders are parts of great circles and of circles around y, so all
+/// places where something can happen are known, and it is enough to look between them.
+std::vector<ImageSpan> panoramaSpans(const Equirectangular& model,
+                                     const Camera& camera,
+                                     const Arc& arc) {
+  constexpr double kAtCut = 1e-9;       // An event so near to a cut happens there, rad.
+  constexpr double kSameEvent = 1e-13;  // Events so near to each other are one.
+  constexpr double kShortest = 1e-12;   // Of a piece.
+  const ArcSampler sampler(arc);
+  const double angle = sampler.angle();
+  const Eigen::Vector3d &from = sampler.from(), &side = sampler.side();
+
+  std::vector<double> events;
+  const auto add = [&](double phi) { events.push_back(phi); };
+  for (const double u : {-0.5, camera.width() - 0.5}) {
+    const double longitude = (u - model.cx) / model.fx;
+    const double c = std::cos(longitude), s = std::sin(longitude);
+    sampler.solve(c * from.x() - s * from.z(), c * side.x() - s * side.z(), 0, add);
+  }
+  for (const double v : {-0.5, camera.height() - 0.5}) {
+    const double latitude = (v - model.cy) / model.fy;
+    if (std::abs(latitude) > M_PI / 2) continue;
+    sampler.solve(from.y(), side.y(), std::sin(latitude), add);
+  }
+  sampler.solve(from.z(), side.z(), std::cos(camera.maxFieldAngleLimit()), add);
+  std::sort(events.begin(), events.end());
+
+  const std::vector<double> cuts = cutsBetween(arc, 0, angle);
+  std::vector<ImageSpan> spans;
+  for (size_t i = 0; i + 1 < cuts.size(); ++i) {
+    const double lo = cuts[i], hi = cuts[i + 1];
+    if (!(hi - lo > kShortest)) continue;
+    const bool from_cut = lo > 0, to_cut = hi < angle;
+    // Stretches in which nothing happens: the piece's ends, and a point in each.
+    std::vector<double> t{lo / angle};
+    double last = lo;
+    for (const double phi : events) {
+      if (!(phi > lo + (from_cut ? kAtCut : 0)) || !(phi < hi - (to_cut ? kAtCut : 0))) continue;
+      if (phi > last + kSameEvent) t.push_back((last + phi) / 2 / angle);
+      last = phi;
+    }
+    t.push_back((last + hi) / 2 / angle);
+    t.push_back(to_cut ? hi / angle : 1.0);
+    const SeamedSampler piece(arc, t.front(), t.back());
+
+    // Where a span that holds t[k] ends towards t[k_out]; the piece's own ends are inside or not by
+    // rounding.
+    const auto endOf = [&](size_t k, size_t k_out) -> std::pair<double, ImageEnd> {
+      Where outside{};
+      const bool at_end = k_out == 0 || k_out + 1 == t.size();
+      const bool at_cut = k_out == 0 ? from_cut : to_cut;
+      if (at_end && whereIs(camera, piece, t[k_out]) == Where::kInside) {
+        return {t[k_out], at_cut ? ImageEnd::kSeam : ImageEnd::kArcEnd};
+      }
+      const double end = lastInside(camera, piece, t[k], t[k_out], &outside);
+      return {end, at_end && at_cut ? ImageEnd::kSeam : endFor(outside)};
+    };
+    bool open = false;
+    for (size_t k = 1; k + 1 < t.size(); ++k) {
+      const bool inside = whereIs(camera, piece, t[k]) == Where::kInside;
+      if (inside && !open) {
+        const auto [begin, why] = endOf(k, k - 1);
+        spans.push_back({begin, begin, why, ImageEnd::kArcEnd});
+      }
+      if (open && !inside) std::tie(spans.back().t1, spans.back().end1) = endOf(k - 1, k);
+      open = inside;
+    }
+    if (open) {
+      std::tie(spans.back().t1, spans.back().end1) = endOf(t.size() - 2, t.size() - 1);
+    }
+  }
+  return spans;
+}
 }  // namespace
 
 double Arc::angle() const {
@@ -222,6 +431,9 @@ double angleBetweenPlanes(const Eigen::Vector3d& n1, const Eigen::Vector3d& n2) 
 }
 
 std::vector<ImageSpan> imageSpans(const Camera& camera, const Arc& arc) {
+  if (const auto* panorama = std::get_if<Equirectangular>(&camera.model())) {
+    return panoramaSpans(*panorama, camera, arc);
+  }
   const ArcSampler sampler(arc);
   const double cone = imageFieldAngle(camera);
   const double max_field_angle = camera.maxFieldAngle();
@@ -277,60 +489,21 @@ std::vector<ImageSpan> imageSpans(const Camera& camera, const Arc& arc) {
 
 std::vector<Eigen::Vector2d> imageCurve(
     const Camera& camera, const Arc& arc, double t0, double t1, double max_chord_err_px) {
-  const ArcSampler sampler(arc);
-  // The curve may be a little further from its chord beside the middle, where it is measured.
-  const double tolerance = 0.9 * max_chord_err_px;
-  std::vector<Eigen::Vector2d> points;
-  points.reserve(64);
-  // Four pieces to start from, each looked at in three inner points, so that a long S-shaped curve
-  // is never taken for a straight one.
-  constexpr int kPieces = 4, kInner = 4;
-  std::array<std::optional<Eigen::Vector2d>, kPieces * kInner + 1> coarse;
-  const auto coarse_t = [&](size_t i) {
-    return i + 1 == coarse.size() ? t1
-                                  : t0 + (t1 - t0) * static_cast<double>(i) / (kPieces * kInner);
-  };
-  for (size_t i = 0; i < coarse.size(); ++i) coarse[i] = camera.project(sampler.at(coarse_t(i)));
-
-  std::optional<Eigen::Vector2d> left;
-  double t_left = t0;
-  // Continues the curve to the point at t; the piece is cut in `parts` at once, then refined.
-  const auto extend = [&](double t, const std::optional<Eigen::Vector2d>& p, int parts) {
-    if (!p) return;
-    const double t_begin = t_left;
-    for (int i = 1; i <= parts; ++i) {
-      const double t_next = i == parts ? t : t_begin + (t - t_begin) * i / parts;
-      const auto next = i == parts ? p : camera.project(sampler.at(t_next));
-      if (!next) continue;
-      if (left) {
-        refine(camera, sampler, t_left, *left, t_next, *next, tolerance, 16, &points);
-      }
-      points.push_back(*next);
-      left = next;
-      t_left = t_next;
+  if (std::holds_alternative<Equirectangular>(camera.model())) {
+    // The longest part that one line can show: for a span, all of it.
+    const double angle = arc.angle();
+    const std::vector<double> cuts = cutsBetween(arc, t0 * angle, t1 * angle);
+    size_t longest = 1;
+    for (size_t i = 2; i < cuts.size(); ++i) {
+      if (cuts[i] - cuts[i - 1] > cuts[longest] - cuts[longest - 1]) longest = i;
     }
-  };
-  extend(t0, coarse[0], 1);
-  for (size_t i = 0; i + 1 < coarse.size(); i += kInner) {
-    const bool complete =
-        coarse[i] && coarse[i + 1] && coarse[i + 2] && coarse[i + 3] && coarse[i + 4];
-    double bend = 0;
-    for (size_t j = 1; complete && j < kInner; ++j) {
-      bend = std::max(bend, distanceToChord(*coarse[i + j], *coarse[i], *coarse[i + kInner]));
-    }
-    if (!complete) {
-      for (size_t j = 1; j <= kInner; ++j) extend(coarse_t(i + j), coarse[i + j], 1);
-    } else if (bend <= tolerance) {
-      points.push_back(*coarse[i + kInner]);
-      left = coarse[i + kInner];
-      t_left = coarse_t(i + kInner);
-    } else {
-      // The distance to the chord falls with the square of the number of parts.
-      const double parts = std::ceil(std::sqrt(1.1 * bend / tolerance));
-      extend(coarse_t(i + kInner), coarse[i + kInner], static_cast<int>(std::min(parts, 1e3)));
-    }
+    if (longest > 1) t0 = cuts[longest - 1] / angle;
+    if (longest + 1 < cuts.size()) t1 = cuts[longest] / angle;
+    // Past a pole, where the longitude runs away like 1 / t, up to twice as far beside the middle.
+    return curveOf(camera, SeamedSampler(arc, t0, t1), t0, t1, 0.45 * max_chord_err_px);
   }
-  return points;
+  // The curve may be a little further from its chord beside the middle, where it is measured.
+  return curveOf(camera, ArcSampler(arc), t0, t1, 0.9 * max_chord_err_px);
 }
 
 }  // namespace dlsd

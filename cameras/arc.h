@@ -42,8 +42,9 @@ struct Arc {
 /// Angle between the planes of two arcs, rad, in [0, pi / 2] (n and -n are the same plane).
 [[nodiscard]] double angleBetweenPlanes(const Eigen::Vector3d& n1, const Eigen::Vector3d& n2);
 
-/// Why a piece of an arc's image ends.
-enum class ImageEnd { kArcEnd, kBorder, kRim };
+/// Why a piece of an arc's image ends: with the arc, at the image border, at the bound of the
+/// camera's domain, or at a seam, behind which the image goes on elsewhere.
+enum class ImageEnd { kArcEnd, kBorder, kRim, kSeam };
 
 /// A piece [t0, t1] of an arc (fractions of its angle) that is inside image and domain.
 struct ImageSpan {
@@ -54,6 +55,12 @@ struct ImageSpan {
 /// The pieces of an arc that the camera images, in order. Cut at the image border (kBorder) and at
 /// the bound of the camera's domain (kRim), each located to 1e-12 of the arc.
 ///
+/// Where the camera has a seam (equirectangular), arcs are cut there too (kSeam): at the half plane
+/// x = 0, z < 0 and, if they pass within 1e-14 rad of one, at the poles +-y. The pieces on both
+/// sides of a cut share its t; their images end on different sides. An end at the image border
+/// within 1e-9 rad of a cut counts as a seam, so that the image of a whole sphere has seams where
+/// it has borders.
+///
 /// Guarantee: every piece, and every gap between pieces, that is longer than 0.1 degrees on the arc
 /// or 2 px in the image is found. Shorter ones may be missed; then the neighbours are reported as
 /// if it were not there. A stretch of the arc is passed over only where nothing can happen: outside
@@ -63,12 +70,16 @@ struct ImageSpan {
 /// Jacobian) at its ends, so it takes a camera whose scale does not rise and fall again by more
 /// than half within 4 degrees, as is true of real lenses and mirrors; counter-examples are FoV with
 /// omega < 0.05 at 90 degrees and the last degrees before -z.
+/// The pieces of a panorama are exact: where a great circle meets longitudes and latitudes has a
+/// closed form.
 [[nodiscard]] std::vector<ImageSpan> imageSpans(const Camera& camera, const Arc& arc);
 
 /// Points on the image of the piece [t0, t1] of an arc, first and last included, joined by straight
 /// pieces that keep within max_chord_err_px of the true curve: measured at the middle of each piece
 /// (and at the quarters of the four it starts from). The piece must be imaged throughout (a span of
-/// imageSpans); a point that falls out of the domain by rounding is left out.
+/// imageSpans); a point that falls out of the domain by rounding is left out. An end on a seam is
+/// drawn on the piece's own side of it; at a pole the curve ends 1e-8 rad before. Nothing is drawn
+/// across a seam: of a piece that goes on behind one, only the longest part is drawn.
 [[nodiscard]] std::vector<Eigen::Vector2d> imageCurve(
     const Camera& camera, const Arc& arc, double t0, double t1, double max_chord_err_px = 0.01);
 

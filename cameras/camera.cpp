@@ -150,9 +150,26 @@ std::optional<Eigen::Vector3d> Camera::unproject(const Eigen::Vector2d& pixel) c
 
 std::optional<ProjectionJacobian> Camera::jacobian(const Eigen::Vector3d& ray_in_cam) const {
   if (!project(ray_in_cam)) return std::nullopt;
-  return std::visit(
+  const ProjectionJacobian J = std::visit(
       [&](const auto& m) { return m.jacobian(ray_in_cam.x(), ray_in_cam.y(), ray_in_cam.z()); },
       model_);
+  return J.allFinite() ? std::optional(J) : std::nullopt;
+}
+
+double imageFieldAngle(const Camera& camera) {
+  if (std::holds_alternative<Equirectangular>(camera.model())) return camera.maxFieldAngle();
+  // The models turn away from the axis as a pixel gets further from the principal point, so the
+  // corners look furthest; the slack is for tangential distortion, as of a tilted lens.
+  constexpr double kSlack = 0.02;
+  double largest = 0;
+  for (const double u : {-0.5, camera.width() - 0.5}) {
+    for (const double v : {-0.5, camera.height() - 0.5}) {
+      const auto ray = camera.unproject({u, v});
+      if (!ray) return camera.maxFieldAngle();
+      largest = std::max(largest, fieldAngle(*ray));
+    }
+  }
+  return std::min(camera.maxFieldAngle(), largest + kSlack);
 }
 
 std::span<const ParamSpec> paramSpecsOf(std::string_view model_name) {

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "cameras/double_sphere.h"
+#include "cameras/equirectangular.h"
 #include "cameras/eucm.h"
 #include "cameras/fov.h"
 #include "cameras/kannala_brandt.h"
@@ -32,7 +33,8 @@ using CameraModelVariant = std::variant<Pinhole,
                                         Ocam,
                                         ThetaPolynomial,
                                         Eucm,
-                                        DoubleSphere>;
+                                        DoubleSphere,
+                                        Equirectangular>;
 
 /// A calibrated central camera. A value: cheap to copy, comparable, immutable.
 class Camera {
@@ -66,7 +68,8 @@ class Camera {
   /// Unit ray in the camera frame of a pixel, inside the image or not. No value outside the domain.
   [[nodiscard]] std::optional<Eigen::Vector3d> unproject(const Eigen::Vector2d& pixel) const;
 
-  /// d(pixel) / d(ray) at a ray that projects. No value outside the domain.
+  /// d(pixel) / d(ray) at a ray that projects. No value outside the domain, and where there is no
+  /// derivative (at the poles of a panorama).
   [[nodiscard]] std::optional<ProjectionJacobian> jacobian(const Eigen::Vector3d& ray_in_cam) const;
 
   /// The image covers [-0.5, width - 0.5] x [-0.5, height - 0.5].
@@ -83,6 +86,15 @@ class Camera {
   double max_field_angle_rad_;
   FieldAngleLimit angle_limit_;
 };
+
+/// Angle of a ray of any length to +z, rad.
+template <class Derived>
+[[nodiscard]] double fieldAngle(const Eigen::MatrixBase<Derived>& ray_in_cam) {
+  return std::atan2(std::hypot(ray_in_cam.x(), ray_in_cam.y()), ray_in_cam.z());
+}
+
+/// An angle to +z (rad) that no pixel of the image looks beyond; at most camera.maxFieldAngle().
+[[nodiscard]] double imageFieldAngle(const Camera& camera);
 
 /// Parameter table of a model by its kName. Throws std::invalid_argument for an unknown name.
 [[nodiscard]] std::span<const ParamSpec> paramSpecsOf(std::string_view model_name);

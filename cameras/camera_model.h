@@ -116,7 +116,7 @@ concept CameraModel = std::regular<M> &&
   { m.params() } -> std::same_as<std::array<double, M::kParams.size()>>;
   { m.project(d, d, d) } -> std::same_as<Pixel<double>>;
   { m.unproject(d, d) } -> std::same_as<Ray<double>>;
-  /// Derivative of project at a valid ray.
+  /// Derivative of project at a valid ray; not finite where there is none.
   { m.jacobian(d, d, d) } -> std::same_as<ProjectionJacobian>;
   /// Supremum of the field angle (angle to +z, rad) of rays that project; the bound of the domain.
   { m.maxFieldAngle() } -> std::same_as<double>;

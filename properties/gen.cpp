@@ -101,7 +101,21 @@ struct Lens {
   double limit;
 };
 
+/// A panorama of the whole sphere or, 1 in 3, of a little more or less.
+Camera makePanorama(const Lens& lens) {
+  const bool whole = lens.corner_angle < 0.75;
+  const int width = std::max(400, lens.width), height = width / 2;
+  const double share = whole ? 1 : lens.overshoot;
+  const std::array<double, 4> params{width / (2 * M_PI * share),
+                                     height / (M_PI * share),
+                                     width * (0.5 + (whole ? 0 : lens.shift_x)) - 0.5,
+                                     height * (0.5 + (whole ? 0 : lens.shift_y)) - 0.5};
+  return makeCamera(
+      Equirectangular::kName, params, width, height, lens.limited == 3 ? lens.limit : M_PI);
+}
+
 Camera makeRealistic(std::string_view model_name, std::vector<double> params, const Lens& lens) {
+  if (model_name == Equirectangular::kName && lens.corner_angle > 0.25) return makePanorama(lens);
   const std::span<const ParamSpec> specs = paramSpecsOf(model_name);
   const auto set = [&](std::string_view name, double value) {
     const size_t i = indexOf(specs, name);
@@ -301,6 +315,17 @@ rc::Gen<Eigen::Vector2d> genPixelOnBorder(const Camera& camera) {
 
 rc::Gen<Eigen::Vector2d> genPixelNearBound(const Camera& camera) {
   const Eigen::Vector2d centre = principalPoint(camera);
+  if (const auto* panorama = std::get_if<Equirectangular>(&camera.model())) {
+    // Of a rectangle: one coordinate at its bound.
+    const Eigen::Vector2d half(panorama->fx * M_PI, panorama->fy * M_PI / 2);
+    return rc::gen::map(rc::gen::tuple(genInt(0, 3), genNearOne(), genReal(-1, 1)),
+                        [centre, half](const std::tuple<int, double, double>& draw) {
+                          const auto [side, near, along] = draw;
+                          Eigen::Vector2d pixel = along * half;
+                          pixel[side % 2] = (side < 2 ? -near : near) * half[side % 2];
+                          return Eigen::Vector2d(centre + pixel);
+                        });
+  }
   return rc::gen::map(
       rc::gen::pair(genRayAt(rc::gen::just(camera.maxFieldAngle() * (1 - 1e-14))), genNearOne()),
       [camera, centre](const std::pair<Eigen::Vector3d, double>& draw) {

@@ -42,7 +42,8 @@ enum class Range {
 /// the domain, pixels are nearly square, the principal point is near the centre; 1 in 4 has a limit
 /// of the field angle. Parameters that depend on the size of the image are those of the table for
 /// a camera of usual size (the geometric mean of the range of fx), scaled to the drawn one. Joint
-/// conditions come out as the model's domain, which is at least 0.7 rad.
+/// conditions come out as the model's domain, which is at least 0.7 rad. Panoramas are of the whole
+/// sphere, of a little more or less or, 1 in 4, such a piece of it.
 [[nodiscard]] rc::Gen<Camera> genCamera(std::string_view model_name, Range range);
 
 template <class Model>
@@ -80,7 +81,8 @@ template <class Model>
 [[nodiscard]] rc::Gen<Eigen::Vector2d> genPixelOnBorder(const Camera& camera);
 
 /// Pixel at the bound of the domain in the image plane (where rays near the bound of the domain go;
-/// for domains that reach to infinity, far out) times (1 +- 10^-k) from the principal point.
+/// for domains that reach to infinity, far out) times (1 +- 10^-k) from the principal point. For
+/// panoramas, on one side of their rectangle times that.
 [[nodiscard]] rc::Gen<Eigen::Vector2d> genPixelNearBound(const Camera& camera);
 
 /// A mix of the three above, pixels near the principal point, and pixels up to 1e9 px away.

@@ -515,6 +515,24 @@ Real maxRadius(const DoubleSphere& m) {
   return alpha <= 0.5L ? kInfinity : 1 / std::sqrt(2 * alpha - 1);
 }
 
+// --- Equirectangular ---
+
+template <class S>
+Point<S> imageOf(const Equirectangular& m, const S& x, const S& y, const S& z) {
+  S longitude = atan2(x, z);
+  // Half-open: the seam itself has the longitude -pi.
+  const bool on_seam = !(x < S(0)) && !(x > S(0)) && z < S(0);
+  if (on_seam && longitude > S(0)) longitude = longitude - S(2 * kPi);
+  return pixelOf(m, Point<S>{longitude, atan2(y, hypot(x, z))});
+}
+Real maxFieldAngle(const Equirectangular&) {
+  return kPi;
+}
+bool hasRay(const Equirectangular& m, Real u, Real v) {
+  const Real longitude = (u - m.cx) / m.fx, latitude = (v - m.cy) / m.fy;
+  return -kPi <= longitude && longitude < kPi && std::abs(latitude) <= kPi / 2;
+}
+
 // --- Models whose bound in the image is a radius ---
 
 template <class M>

@@ -241,26 +241,6 @@ class View {
   std::vector<double> height_;  ///< Of the camera over each face's plane, m.
 };
 
-/// Largest angle to +z of a ray of the image: on its border, or the whole domain if the border is
-/// partly outside of it.
-double imageFieldAngle(const Camera& camera) {
-  double largest = 0;
-  constexpr int kSteps = 256;
-  for (int k = 0; k <= kSteps; ++k) {
-    const double x = -0.5 + camera.width() * static_cast<double>(k) / kSteps;
-    const double y = -0.5 + camera.height() * static_cast<double>(k) / kSteps;
-    for (const Eigen::Vector2d& p : {Eigen::Vector2d(x, -0.5),
-                                     Eigen::Vector2d(x, camera.height() - 0.5),
-                                     Eigen::Vector2d(-0.5, y),
-                                     Eigen::Vector2d(camera.width() - 0.5, y)}) {
-      const auto ray = camera.unproject(p);
-      if (!ray) return camera.maxFieldAngle();
-      largest = std::max(largest, std::atan2(std::hypot(ray->x(), ray->y()), ray->z()));
-    }
-  }
-  return std::min(camera.maxFieldAngle(), largest + 0.02);
-}
-
 EndKind endKind(ImageEnd end) {
   switch (end) {
     case ImageEnd::kArcEnd:
@@ -269,6 +249,8 @@ EndKind endKind(ImageEnd end) {
       return EndKind::kBorder;
     case ImageEnd::kRim:
       return EndKind::kRim;
+    case ImageEnd::kSeam:
+      return EndKind::kSeam;
   }
   return EndKind::kVertex;
 }
@@ -341,8 +323,7 @@ std::vector<EdgeSpan> visibleSpans(const Scene& scene,
     if (!view.mayShow(edge)) continue;
     const auto arc = edgeArc(scene, pose, static_cast<int>(i));
     if (!arc) continue;
-    const Eigen::Vector3d& m = arc->middle;
-    if (std::atan2(std::hypot(m.x(), m.y()), m.z()) - arc->angle / 2 > field) continue;
+    if (fieldAngle(arc->middle) - arc->angle / 2 > field) continue;
     if (view.isOutline(edge)) outlines.push_back(*arc);
     std::vector<ImageSpan> imaged = imageSpans(camera, arc->arc);
     if (!imaged.empty()) candidates.push_back({*arc, std::move(imaged)});

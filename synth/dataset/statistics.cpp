@@ -107,7 +107,8 @@ double LabelStatistics::touchingShare() const {
 }
 double LabelStatistics::cutEndShare() const {
   const auto count = [&](EndKind kind) { return ends[static_cast<size_t>(kind)]; };
-  return share(count(EndKind::kOccluder) + count(EndKind::kBorder) + count(EndKind::kRim),
+  return share(count(EndKind::kOccluder) + count(EndKind::kBorder) + count(EndKind::kRim) +
+                   count(EndKind::kSeam),
                2 * lines);
 }
 

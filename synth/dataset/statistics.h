@@ -30,7 +30,7 @@ struct LabelStatistics {
   /// Shares, 0 for an empty set.
   [[nodiscard]] double crowdedShare() const;
   [[nodiscard]] double touchingShare() const;
-  /// Span ends at an occluder, the image border or the field-of-view rim.
+  /// Span ends at an occluder, the image border, the field-of-view rim or a seam.
   [[nodiscard]] double cutEndShare() const;
 };
 
