@@ -58,8 +58,10 @@ Samples upToAngle(const Samples& all, double max_angle) {
   return samples;
 }
 
-/// The fit's cost: squared distances of the rays that project, and for each that does not the same
-/// large amount, so that projecting more goes first.
+/// The fit's cost: over the rays d^2 / (1 + d^2 / D^2), which is the squared distance d^2 as long
+/// as that is small against the image's diagonal D; what is far beyond the image (rays near 90
+/// degrees under a pinhole) has no more say than that. A ray that does not project costs D^2, the
+/// most.
 class Fit {
  public:
   Fit(std::string_view model, const Camera& source, const Samples& samples)
@@ -68,15 +70,16 @@ class Fit {
         samples_(samples),
         width_(source.width()),
         height_(source.height()),
-        lost_cost_(std::pow(width_ + height_, 2)),
+        lost_cost_(std::pow(width_, 2) + std::pow(height_, 2)),
         u_(samples.size()),
         v_(samples.size()),
         valid_(samples.size()) {}
 
   struct Value {
     double cost = std::numeric_limits<double>::infinity();
-    VectorXd residual;  ///< u and v by turns; 0 for rays that do not project.
-    std::vector<uint8_t> valid;
+    VectorXd residual;  ///< Weighted distances in u and v by turns; 0 for what does not project.
+    std::vector<double> weight;  ///< Of u and v; 0 for rays that do not project.
+    VectorXd pixels;             ///< u and v by turns.
   };
 
   [[nodiscard]] Value at(const VectorXd& params) {
@@ -88,16 +91,23 @@ class Fit {
       return value;  // parameters that the model does not admit
     }
     projectAll(*camera, samples_.x, samples_.y, samples_.z, u_, v_, valid_);
-    value.residual.resize(Eigen::Index(2 * samples_.size()));
-    value.valid = valid_;
+    value.residual.setZero(Eigen::Index(2 * samples_.size()));
+    value.pixels.setZero(value.residual.size());
+    value.weight.assign(samples_.size(), 0);
     value.cost = 0;
     for (size_t i = 0; i < samples_.size(); ++i) {
-      const bool valid = valid_[i] != 0;
-      const double du = valid ? u_[i] - samples_.u[i] : 0;
-      const double dv = valid ? v_[i] - samples_.v[i] : 0;
-      value.residual[Eigen::Index(2 * i)] = du;
-      value.residual[Eigen::Index(2 * i + 1)] = dv;
-      value.cost += valid ? du * du + dv * dv : lost_cost_;
+      if (valid_[i] == 0) {
+        value.cost += lost_cost_;
+        continue;
+      }
+      const double du = u_[i] - samples_.u[i], dv = v_[i] - samples_.v[i];
+      const double square = du * du + dv * dv;
+      const double weight = 1 / (1 + square / lost_cost_);
+      const auto row = Eigen::Index(2 * i);
+      value.cost += weight * square;
+      value.weight[i] = weight;
+      value.pixels.segment<2>(row) << u_[i], v_[i];
+      value.residual.segment<2>(row) << weight * du, weight * dv;
     }
     return value;
   }
@@ -165,7 +175,10 @@ class Fit {
     Eigen::MatrixXd jacobian = Eigen::MatrixXd::Zero(value.residual.size(), n);
     for (Eigen::Index i = 0; i < n; ++i) {
       double& step = steps_[size_t(i)];
-      if (step == 0) step = 1e-6 * std::max(1e-3, std::abs(params[i]));
+      if (step == 0) {
+        const ParamSpec& spec = specs_[size_t(i)];
+        step = 1e-4 * (spec.realistic_max - spec.realistic_min);
+      }
       for (int trial = 0; trial < 40; ++trial) {
         VectorXd up = params, down = params;
         up[i] = clamped(i, params[i] + step);
@@ -176,13 +189,20 @@ class Fit {
           continue;
         }
         double moved = 0;
-        for (Eigen::Index row = 0; row < value.residual.size(); ++row) {
-          const auto sample = size_t(row / 2);
-          const bool valid =
-              value.valid[sample] != 0 && a.valid[sample] != 0 && b.valid[sample] != 0;
-          const double move = valid ? a.residual[row] - b.residual[row] : 0;
-          moved = std::max(moved, std::abs(move));
-          jacobian(row, i) = move / (up[i] - down[i]);
+        size_t lost = 0;
+        for (size_t k = 0; k < value.weight.size(); ++k) {
+          const auto row = Eigen::Index(2 * k);
+          const bool valid = value.weight[k] > 0 && a.weight[k] > 0 && b.weight[k] > 0;
+          lost += value.weight[k] > 0 && !valid ? 1 : 0;
+          const Eigen::Vector2d move =
+              valid ? Eigen::Vector2d(a.pixels.segment<2>(row) - b.pixels.segment<2>(row))
+                    : Eigen::Vector2d(0, 0);
+          moved = std::max(moved, move.lpNorm<Eigen::Infinity>());
+          jacobian.block<2, 1>(row, i) = value.weight[k] / (up[i] - down[i]) * move;
+        }
+        if (moved == 0 && lost > 0) {
+          step /= 1e3;
+          continue;
         }
         if (moved > kMovePx * 100) {
           step *= kMovePx / moved;
@@ -270,7 +290,8 @@ const std::array<ShapeStarts, 4> kShapeStarts{{{"omega", {0.1, 0.5, 0.9, 1.4}},
 /// the source at the optical axis in position and scale.
 class Starts {
  public:
-  Starts(const Camera& source, std::string_view model) : specs_(paramSpecsOf(model)) {
+  Starts(const Camera& source, std::string_view model, double max_angle)
+      : specs_(paramSpecsOf(model)), max_angle_(max_angle) {
     const Eigen::Vector3d axis = Eigen::Vector3d::UnitZ();
     const std::optional<Eigen::Vector2d> centre = source.project(axis);
     const Eigen::Vector2d middle((source.width() - 1) / 2.0, (source.height() - 1) / 2.0);
@@ -285,11 +306,18 @@ class Starts {
     set("cx", centre_.x(), &params);
     set("cy", centre_.y(), &params);
     set("aspect", scale_.y() / scale_.x(), &params);
-    set("c", scale_.x() / scale_.y(), &params);  // OCam's stretch of the first axis
-    combine(model, 0, params);
+    if (find("a0") >= 0) {
+      starts_.push_back({ocamStart(source, params), true});
+    } else {
+      combine(model, 0, params);
+    }
   }
 
-  [[nodiscard]] const std::vector<VectorXd>& all() const { return starts_; }
+  struct Start {
+    VectorXd params;
+    bool whole = false;  ///< Good over the whole image, not only near the axis.
+  };
+  [[nodiscard]] const std::vector<Start>& all() const { return starts_; }
 
  private:
   [[nodiscard]] Eigen::Index find(std::string_view name) const {
@@ -322,22 +350,43 @@ class Starts {
       if (!jacobian) return;
       set("fx", scale_.x() / (*jacobian)(0, 0), &params);
       set("fy", scale_.y() / (*jacobian)(1, 1), &params);
-      starts_.push_back(params);
-    } else if (find("a0") >= 0) {
-      // A pinhole; the polynomial's sign depends on where the model's camera looks.
-      for (const double sign : {1.0, -1.0}) {
-        set("a0", sign * scale_.y(), &params);
-        starts_.push_back(params);
-      }
+      starts_.push_back({params});
     } else {
       set("k1", scale_.x(), &params);  // radius in px = k1 theta + ...
-      starts_.push_back(params);
+      starts_.push_back({params});
     }
   }
 
+  /// OCam is defined from pixels to rays, (rho, -f(rho)) along (sin, cos) of the field angle, and
+  /// linear in its polynomial f: solved by least squares.
+  [[nodiscard]] VectorXd ocamStart(const Camera& source, VectorXd params) const {
+    set("c", scale_.y() / scale_.x(), &params);
+    const Samples samples = sampleImage(source, 48, max_angle_);
+    const double range = std::hypot(source.width(), source.height());
+    constexpr Eigen::Index kTerms = 9;
+    Eigen::MatrixXd a(Eigen::Index(samples.size()), kTerms);
+    VectorXd b(a.rows());
+    for (Eigen::Index i = 0; i < a.rows(); ++i) {
+      const auto k = size_t(i);
+      const double rho = std::hypot(samples.u[k] - centre_.x(),
+                                    (samples.v[k] - centre_.y()) * scale_.x() / scale_.y());
+      const double weight = 1 / (1 + rho);
+      for (Eigen::Index term = 0; term < kTerms; ++term) {
+        a(i, term) = weight * std::sin(samples.angle[k]) * std::pow(rho / range, double(term));
+      }
+      b[i] = -weight * rho * std::cos(samples.angle[k]);
+    }
+    const VectorXd polynomial = a.colPivHouseholderQr().solve(b);
+    for (Eigen::Index term = 0; term < kTerms; ++term) {
+      params[find("a0") + term] = polynomial[term] / std::pow(range, double(term));
+    }
+    return params;
+  }
+
   std::span<const ParamSpec> specs_;
+  double max_angle_;
   Eigen::Vector2d centre_, scale_;
-  std::vector<VectorXd> starts_;
+  std::vector<Start> starts_;
 };
 
 /// Whether pixels of the source's image have no ray or a larger field angle.
@@ -349,7 +398,7 @@ bool endsInImage(const Camera& source, double max_angle) {
 }
 
 std::optional<Camera> fitCamera(const Camera& source, std::string_view model, double max_angle) {
-  constexpr int kCoarse = 24, kFine = 64;
+  constexpr int kCoarse = 20, kFine = 48;
   const Samples coarse = sampleImage(source, kCoarse, max_angle);
   const Samples fine = sampleImage(source, kFine, max_angle);
   if (fine.size() == 0) return std::nullopt;
@@ -362,9 +411,10 @@ std::optional<Camera> fitCamera(const Camera& source, std::string_view model, do
     VectorXd params;
   };
   std::vector<Candidate> candidates;
-  const Starts starts(source, model);
-  for (VectorXd params : starts.all()) {
-    for (double angle = M_PI / 6; angle < widest; angle += M_PI / 18) {
+  const Starts starts(source, model, max_angle);
+  for (const auto& [start, whole] : starts.all()) {
+    VectorXd params = start;
+    for (double angle = M_PI / 6; !whole && angle < widest; angle += M_PI / 18) {
       const Samples inner = upToAngle(coarse, angle);
       if (inner.size() >= 20) params = Fit(model, source, inner).minimise(params, 20);
     }
@@ -382,7 +432,8 @@ std::optional<Camera> fitCamera(const Camera& source, std::string_view model, do
   for (const Candidate& candidate : candidates) {
     const VectorXd params = fit.minimise(candidate.params, 200);
     const Fit::Value value = fit.at(params);
-    const bool projects = std::find(value.valid.begin(), value.valid.end(), 1) != value.valid.end();
+    const bool projects =
+        std::any_of(value.weight.begin(), value.weight.end(), [](double w) { return w > 0; });
     if (projects && value.cost < best.cost) best = {value.cost, params};
   }
   if (best.params.size() == 0) return std::nullopt;

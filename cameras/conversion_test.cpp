@@ -93,8 +93,25 @@ TEST(Conversion, ExactRelationsComeOutToRounding) {
   } cases[] = {
       {pinhole(), "omni"},
       {pinhole(), "fov"},
+      {pinhole(), "pinhole_radtan"},
+      {pinhole(), "eucm"},
+      {pinhole(), "double_sphere"},
+      {pinhole(), "ocam"},
       {makeCamera("omni", std::vector{0.0, 500.0, 510.0, 320.0, 200.0}, 640, 480), "pinhole"},
       {makeCamera("fov", std::vector{500.0, 510.0, 320.0, 200.0, 0.0}, 640, 480), "omni"},
+      {mirror(), "eucm"},
+      {mirror(), "double_sphere"},
+      {mirror(), "omni_radtan"},
+      {makeCamera("kannala_brandt",
+                  std::vector{190.0, 191.0, 320.0, 240.0, -0.03, 0.0, 0.0, 0.0},
+                  640,
+                  480),
+       "theta_polynomial"},
+      {makeCamera("pinhole_radtan",
+                  std::vector{400.0, 402.0, 320.0, 240.0, -0.1, 0.01, 1e-3, -2e-3, 0.0},
+                  640,
+                  480),
+       "omni_radtan"},
   };
   for (const auto& c : cases) {
     SCOPED_TRACE(std::string(c.source.modelName()) + " to " + c.model);

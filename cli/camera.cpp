@@ -1,153 +1,137 @@
-#include "cameras/camera.h"
-
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
+#include <Eigen/Geometry>
 #include <cmath>
-#include <memory>
-#include <optional>
+#include <filesystem>
+#include <iterator>
+#include <utility>
 
-#include "cameras/batch.h"
-#include "cameras/calibration/calibration.h"
 #include "cameras/calibration/files.h"
+#include "cli/camera_commands.h"
 #include "cli/command.h"
 
 namespace dlsd::cli {
 namespace {
 
-using Eigen::Vector2d;
-using Eigen::Vector3d;
-
-constexpr double kDegrees = 180 / M_PI;
-
-double fieldAngle(const Vector3d& ray) {
-  return std::atan2(std::hypot(ray.x(), ray.y()), ray.z());
-}
-
-/// Angle to the optical axis of the farthest pixel with a ray between two, the first of which has
-/// one.
-struct Reach {
-  double angle_rad;
-  bool cut;  ///< The domain ends before the second pixel.
+struct Entry {
+  const char* name;
+  const char* help;
+  Run (*add)(CLI::App& command);
 };
 
-Reach reach(const Camera& camera, const Vector2d& centre, const Vector2d& border) {
-  if (const std::optional<Vector3d> ray = camera.unproject(border)) {
-    return {fieldAngle(*ray), false};
-  }
-  double inside = 0, outside = 1;
-  while (outside - inside > 1e-9) {
-    const double t = (inside + outside) / 2;
-    (camera.unproject(centre + t * (border - centre)) ? inside : outside) = t;
-  }
-  const std::optional<Vector3d> ray = camera.unproject(centre + inside * (border - centre));
-  return {ray ? fieldAngle(*ray) : 0, true};
-}
-
-/// Angles on both sides of the axis, summed: past 180 degrees, too.
-std::string fieldOfView(const Camera& camera,
-                        const Vector2d& centre,
-                        const Vector2d& one_border,
-                        const Vector2d& other_border) {
-  const Reach a = reach(camera, centre, one_border);
-  const Reach b = reach(camera, centre, other_border);
-  return fmt::format("{:.2f} deg ({:.2f} + {:.2f}){}",
-                     (a.angle_rad + b.angle_rad) * kDegrees,
-                     a.angle_rad * kDegrees,
-                     b.angle_rad * kDegrees,
-                     a.cut || b.cut ? ", cut by the domain" : "");
-}
-
-size_t pixelsWithRay(const Camera& camera) {
-  const auto width = size_t(camera.width());
-  std::vector<double> u(width), v(width), x(width), y(width), z(width);
-  std::vector<uint8_t> valid(width);
-  for (size_t i = 0; i < width; ++i) {
-    u[i] = double(i);
-  }
-  size_t count = 0;
-  for (int row = 0; row < camera.height(); ++row) {
-    std::fill(v.begin(), v.end(), double(row));
-    unprojectAll(camera, u, v, x, y, z, valid);
-    for (const uint8_t one : valid) {
-      count += one;
-    }
-  }
-  return count;
-}
-
-int show(const std::string& path) {
-  const Camera camera = loadCamera(path);
-  std::string text;
-  const auto row = [&](const std::string& name, const std::string& value) {
-    text += fmt::format("{:<18}  {}\n", name, value);
-  };
-  row("model", std::string(camera.modelName()));
-  row("size", fmt::format("{} x {} px", camera.width(), camera.height()));
-  const std::vector<double> params = camera.params();
-  std::optional<double> cx, cy;
-  for (size_t i = 0; i < params.size(); ++i) {
-    const ParamSpec& spec = camera.paramSpecs()[i];
-    row(std::string(spec.name),
-        fmt::format(
-            "{}{}{}", params[i], spec.unit == "1" ? "" : " ", spec.unit == "1" ? "" : spec.unit));
-    if (spec.name == "cx") {
-      cx = params[i];
-    } else if (spec.name == "cy") {
-      cy = params[i];
-    }
-  }
-  const double w = camera.width();
-  const double h = camera.height();
-  const Vector2d centre(cx.value_or((w - 1) / 2), cy.value_or((h - 1) / 2));
-  row("principal point",
-      fmt::format("({}, {}) if (0, 0) is the centre of the top left pixel, as everywhere in dlsd",
-                  centre.x(),
-                  centre.y()));
-  row("", fmt::format("({}, {}) if (0, 0) is its corner", centre.x() + 0.5, centre.y() + 0.5));
-  row("domain",
-      fmt::format("rays up to {:.4f} deg from the optical axis project{}",
-                  camera.maxFieldAngle() * kDegrees,
-                  camera.maxFieldAngleLimit() < M_PI ? " (max_field_angle of the file)" : ""));
-  if (camera.unproject(centre) && camera.inImage(centre)) {
-    row("horizontal view", fieldOfView(camera, centre, {-0.5, centre.y()}, {w - 0.5, centre.y()}));
-    row("vertical view", fieldOfView(camera, centre, {centre.x(), -0.5}, {centre.x(), h - 0.5}));
-    row("diagonal view", fieldOfView(camera, centre, {-0.5, -0.5}, {w - 0.5, h - 0.5}));
-    row("", fieldOfView(camera, centre, {w - 0.5, -0.5}, {-0.5, h - 0.5}));
-  } else {
-    row("view", "the principal point is outside the image: no view across it");
-  }
-  const size_t with_ray = pixelsWithRay(camera);
-  const size_t pixels = size_t(camera.width()) * size_t(camera.height());
-  row("pixels with a ray",
-      fmt::format("{}/{} {:.2f} %", with_ray, pixels, 100 * double(with_ray) / double(pixels)));
-  row("conventions",
-      fmt::format("image [-0.5, {}] x [-0.5, {}], x right, y down, z forward", w - 0.5, h - 0.5));
-  print(text);
-  return kDone;
-}
+constexpr Entry kCommands[] = {
+    {"show", "Model, parameters, field of view, domain and conventions of cameras.", addCameraShow},
+    {"check",
+     "Does every pixel come back from its ray; with photographs: are lines straight.",
+     addCameraCheck},
+    {"convert",
+     "Write a camera in another file format, or fit another model to it.",
+     addCameraConvert},
+    {"rectify", "Pinhole, cylindrical and equirectangular views of images.", addCameraRectify},
+};
 
 }  // namespace
 
-Run addCamera(CLI::App& command) {
-  const auto path = std::make_shared<std::string>();
-  CLI::App* show_command = command.add_subcommand(
-      "show", "Model, parameters, field of view, domain and conventions of a camera.");
-  show_command->add_option("file", *path, "Calibration file, or file:camera if it holds several")
+void addCameraArgument(CLI::App& command, CameraArgument* argument) {
+  command
+      .add_option("file", argument->path, "Calibration file, or file:camera if it holds several")
       ->type_name("FILE")
       ->required();
-  const std::string examples =
-      "Examples:\n"
-      "  dlsd camera show wide.yaml\n"
-      "  dlsd camera show rig.yaml:cam1";
-  show_command->footer(examples);
-  command.footer(examples);
-  return [path, show_command]() -> int {
-    if (!show_command->parsed()) {
-      throw InputError("camera needs to be told what to do: show (dlsd camera --help)");
+  std::vector<std::string> names;
+  for (const CalibrationFormat& format : calibrationFormats()) {
+    names.emplace_back(format.name);
+  }
+  command
+      .add_option("--format",
+                  argument->format,
+                  fmt::format("The file's format, if its content does not tell: {}",
+                              fmt::join(names, ", ")))
+      ->type_name("NAME")
+      ->check(CLI::IsMember(names));
+}
+
+LoadedCalibration loadChosen(const CameraArgument& argument) {
+  const std::string file = calibrationFile(argument.path);
+  if (file == argument.path) {
+    return loadCalibration(file, argument.format);
+  }
+  const std::string name = argument.path.substr(file.size() + 1);
+  LoadedCalibration calibration = loadCalibration(file, argument.format);
+  std::vector<std::string> names;
+  for (const NamedCamera& camera : calibration.cameras) {
+    if (camera.name == name) {
+      const NamedCamera chosen = camera;
+      calibration.cameras = {chosen};
+      return calibration;
     }
-    return show(*path);
+    names.push_back(camera.name);
+  }
+  throw InputError(
+      fmt::format("{}: has no camera \"{}\", only {}", file, name, fmt::join(names, ", ")));
+}
+
+Camera loadOne(const CameraArgument& argument) {
+  const LoadedCalibration calibration = loadChosen(argument);
+  if (calibration.cameras.size() > 1) {
+    std::vector<std::string> names;
+    for (const NamedCamera& camera : calibration.cameras) {
+      names.push_back(argument.path + ":" + camera.name);
+    }
+    throw InputError(fmt::format(
+        "{}: holds several cameras, choose one of {}", argument.path, fmt::join(names, ", ")));
+  }
+  return calibration.cameras.front().camera;
+}
+
+double fieldAngle(const Eigen::Vector3d& ray_in_cam) {
+  return std::atan2(std::hypot(ray_in_cam.x(), ray_in_cam.y()), ray_in_cam.z());
+}
+
+Eigen::Vector3d rayAt(double field_angle_rad, double azimuth_rad) {
+  const double s = std::sin(field_angle_rad);
+  return {s * std::cos(azimuth_rad), s * std::sin(azimuth_rad), std::cos(field_angle_rad)};
+}
+
+std::optional<Scale> scaleAt(const Camera& camera, const Eigen::Vector3d& ray_in_cam) {
+  const std::optional<ProjectionJacobian> jacobian = camera.jacobian(ray_in_cam.normalized());
+  if (!jacobian) {
+    return std::nullopt;
+  }
+  const Eigen::Vector3d ray = ray_in_cam.normalized();
+  const double r = std::hypot(ray.x(), ray.y());
+  const Eigen::Vector3d across =
+      r > 0 ? Eigen::Vector3d(-ray.y() / r, ray.x() / r, 0) : Eigen::Vector3d::UnitY();
+  return Scale{fieldAngle(ray),
+               (*jacobian * across.cross(ray)).norm() / kDegreesPerRad,
+               (*jacobian * across).norm() / kDegreesPerRad};
+}
+
+Run addCamera(CLI::App& command) {
+  std::vector<std::pair<CLI::App*, Run>> commands;
+  std::vector<std::string> names;
+  for (const Entry& entry : kCommands) {
+    CLI::App* sub = command.add_subcommand(entry.name, entry.help);
+    commands.emplace_back(sub, entry.add(*sub));
+    names.emplace_back(entry.name);
+  }
+  command.footer(
+      "Examples:\n"
+      "  dlsd camera show wide.yaml --plot wide.png\n"
+      "  dlsd camera check wide.yaml --image photo.png\n"
+      "  dlsd camera convert wide.yaml --to kannala_brandt --out wide_kb.yaml\n"
+      "  dlsd camera rectify wide.yaml photo.png --crop --out rectified\n"
+      "dlsd camera COMMAND --help shows more.");
+  return [commands, names]() -> int {
+    for (const auto& [sub, run] : commands) {
+      if (sub->parsed()) {
+        return run();
+      }
+    }
+    throw InputError(fmt::format("camera needs to be told what to do: {} (dlsd camera --help)",
+                                 fmt::join(names, ", ")));
   };
 }
 
