@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <map>
 #include <memory>
+#include <optional>
 #include <utility>
 
 #include "cameras/calibration/calibration.h"
@@ -20,7 +21,7 @@ namespace dlsd::cli {
 namespace {
 
 struct Arguments {
-  std::string camera, data, out = "-", overlay;
+  std::string camera, data, out = "-", overlay, mask;
   std::vector<std::string> images;
   bool paper = false, time = false;
 };
@@ -71,6 +72,43 @@ std::string overlayPath(const std::string& folder, const Task& task) {
   return folder + "/" + std::filesystem::path(task.path).stem().string() + ".png";
 }
 
+/// Lines of an image, outside the mask if there is one.
+std::vector<DetectionLine> detectLines(Detector& detector,
+                                       const Image& image,
+                                       const std::optional<Image>& mask) {
+  if (!mask) {
+    return dlsd::detectLines(detector, image);
+  }
+  std::vector<DetectionLine> lines;
+  for (const DetectedLine& line : detector.detect(viewOf(image), viewOf(*mask))) {
+    lines.push_back(toDetectionLine(detector.camera(), line));
+  }
+  return lines;
+}
+
+/// A mask for images of these cameras.
+Image readMask(const std::string& path, const std::map<std::string, Camera>& cameras) {
+  Image mask = readImage(path);
+  if (mask.channels != 1 || mask.bits != 8) {
+    throw InputError(fmt::format("{}: a mask has one channel of 8 bits, this has {} of {}",
+                                 path,
+                                 mask.channels,
+                                 mask.bits));
+  }
+  for (const auto& [name, camera] : cameras) {
+    if (mask.width != camera.width() || mask.height != camera.height()) {
+      throw InputError(fmt::format("{}: is {}x{} px, the camera {} is {}x{} px",
+                                   path,
+                                   mask.width,
+                                   mask.height,
+                                   name,
+                                   camera.width(),
+                                   camera.height()));
+    }
+  }
+  return mask;
+}
+
 /// Median over the images of each stage's time.
 std::string table(const std::vector<StageTimes>& times) {
   constexpr std::pair<const char*, double StageTimes::*> kStages[] = {
@@ -95,7 +133,12 @@ std::string table(const std::vector<StageTimes>& times) {
 }
 
 int run(const Arguments& arguments) {
-  const Work work = workOf(arguments);
+  Work work = workOf(arguments);
+  std::optional<Image> mask;
+  if (!arguments.mask.empty()) {
+    mask = readMask(arguments.mask, work.cameras);
+    work.inputs.push_back(arguments.mask);
+  }
   const bool to_stdout = arguments.out == "-";
   std::vector<std::string> outputs;
   if (!to_stdout) {
@@ -148,7 +191,7 @@ int run(const Arguments& arguments) {
         record.camera = task.camera;
         record.width = image.width;
         record.height = image.height;
-        record.lines = detectLines(detector, image);
+        record.lines = detectLines(detector, image, mask);
         if (arguments.time) {
           times.push_back(detector.times());
           record.time_ms = 1000 * times.back().total;
@@ -207,6 +250,9 @@ Run addDetect(CLI::App& command) {
           "--out", arguments->out, "Detections, one JSON object per line; - is standard output")
       ->type_name("FILE")
       ->capture_default_str();
+  command
+      .add_option("--mask", arguments->mask, "8-bit grey image: no lines where it is black (0)")
+      ->type_name("FILE");
   command.add_flag("--paper", arguments->paper, "The algorithm as published, not the default");
   command
       .add_option("--overlay",

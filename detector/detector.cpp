@@ -1,6 +1,7 @@
 #include "detector/detector.h"
 
 #include <algorithm>
+#include <cstring>
 #include <optional>
 #include <stdexcept>
 #include <string>
@@ -28,29 +29,44 @@ int bytesPerValue(PixelType type) {
   throw std::invalid_argument("image has an unknown pixel type");
 }
 
-void checkView(const ImageView& image, const Camera& camera) {
+void checkView(const ImageView& image, const Camera& camera, const std::string& what) {
   if (image.width != camera.width() || image.height != camera.height()) {
-    throw std::invalid_argument("image is " + std::to_string(image.width) + " x " +
+    throw std::invalid_argument(what + " is " + std::to_string(image.width) + " x " +
                                 std::to_string(image.height) + " but the camera is " +
                                 std::to_string(camera.width()) + " x " +
                                 std::to_string(camera.height()));
   }
-  if (image.data == nullptr) throw std::invalid_argument("image has no data");
+  if (image.data == nullptr) throw std::invalid_argument(what + " has no data");
   if (image.channels != 1 && image.channels != 3 && image.channels != 4) {
-    throw std::invalid_argument("image has " + std::to_string(image.channels) +
+    throw std::invalid_argument(what + " has " + std::to_string(image.channels) +
                                 " channels: allowed are 1, 3 and 4");
   }
   const int value_bytes = bytesPerValue(image.type);
   const ptrdiff_t row_bytes = ptrdiff_t{image.width} * image.channels * value_bytes;
   // A single row needs no stride; rows may also run upwards in memory.
   if (image.height > 1 && std::abs(image.stride_bytes) < row_bytes) {
-    throw std::invalid_argument("image stride of " + std::to_string(image.stride_bytes) +
+    throw std::invalid_argument(what + " stride of " + std::to_string(image.stride_bytes) +
                                 " bytes is shorter than a row of " + std::to_string(row_bytes));
   }
   if (reinterpret_cast<uintptr_t>(image.data) % static_cast<uintptr_t>(value_bytes) != 0 ||
       image.stride_bytes % value_bytes != 0) {
-    throw std::invalid_argument("image rows are not aligned to their pixel type");
+    throw std::invalid_argument(what + " rows are not aligned to their pixel type");
   }
+}
+
+/// Bits of a row where the mask is not 0, eight pixels at a time.
+void packMaskRow(const uint8_t* mask, int width, uint64_t* words) {
+  int x = 0;
+  for (; x + 8 <= width; x += 8) {
+    uint64_t eight = 0;
+    std::memcpy(&eight, mask + x, sizeof eight);
+    constexpr uint64_t kLow = 0x7f7f7f7f7f7f7f7f;
+    const uint64_t flags = (((eight & kLow) + kLow) | eight) >> 7 & 0x0101010101010101;
+    // The multiplication moves the flag of byte k to bit k of the top byte.
+    const uint64_t bits = flags * 0x0102040810204080 >> 56;
+    words[x / 64] |= bits << (x % 64);
+  }
+  for (; x < width; ++x) words[x / 64] |= static_cast<uint64_t>(mask[x] != 0) << (x % 64);
 }
 
 }  // namespace
@@ -65,8 +81,11 @@ struct Detector::Impl {
     }
   }
 
+  void run(const ImageView& image, const BitRows& where);
+
   RayTable rays;
   UsableMask usable;
+  BitRows masked;
   std::optional<PaperDetector> paper;
   std::optional<PlaneDetector> planes;
   std::vector<DetectedLine> lines;
@@ -80,30 +99,53 @@ Detector::~Detector() = default;
 Detector::Detector(Detector&&) noexcept = default;
 Detector& Detector::operator=(Detector&&) noexcept = default;
 
-const std::vector<DetectedLine>& Detector::detect(const ImageView& image) {
-  Impl& d = *impl_;
-  checkView(image, camera());
-  d.times = {};
-  d.lines.clear();
-  const StopWatch watch(&d.times.total);
-  if (d.paper) {
-    d.paper->detect(image, d.usable.bits(), &d.lines, &d.times);
+void Detector::Impl::run(const ImageView& image, const BitRows& where) {
+  const Camera& camera = rays.camera();
+  times = {};
+  lines.clear();
+  const StopWatch watch(&times.total);
+  if (paper) {
+    paper->detect(image, where, &lines, &times);
   } else {
-    d.planes->detect(image, d.usable.bits(), &d.lines, &d.times);
+    planes->detect(image, where, usable.bits(), &lines, &times);
   }
-  std::erase_if(d.lines, [&](DetectedLine& line) {
-    const auto from_px = camera().project(line.arc.from), to_px = camera().project(line.arc.to);
+  std::erase_if(lines, [&](DetectedLine& line) {
+    const auto from_px = camera.project(line.arc.from), to_px = camera.project(line.arc.to);
     if (!from_px || !to_px) return true;
     line.from_px = *from_px;
     line.to_px = *to_px;
     return false;
   });
-  std::sort(d.lines.begin(), d.lines.end(), [](const DetectedLine& a, const DetectedLine& b) {
+  std::sort(lines.begin(), lines.end(), [](const DetectedLine& a, const DetectedLine& b) {
     const auto position = [](const DetectedLine& l) {
       return std::make_tuple(l.from_px.x(), l.from_px.y(), l.to_px.x(), l.to_px.y());
     };
     return a.score != b.score ? a.score > b.score : position(a) < position(b);
   });
+}
+
+const std::vector<DetectedLine>& Detector::detect(const ImageView& image) {
+  checkView(image, camera(), "image");
+  impl_->run(image, impl_->usable.bits());
+  return impl_->lines;
+}
+
+const std::vector<DetectedLine>& Detector::detect(const ImageView& image, const ImageView& mask) {
+  checkView(image, camera(), "image");
+  checkView(mask, camera(), "mask");
+  if (mask.channels != 1 || mask.type != PixelType::kU8) {
+    throw std::invalid_argument("mask must have one channel of 8 bits");
+  }
+  Impl& d = *impl_;
+  const BitRows& usable = d.usable.bits();
+  if (d.masked.words.empty()) d.masked = BitRows(mask.width, mask.height);
+  std::fill(d.masked.words.begin(), d.masked.words.end(), uint64_t{0});
+  for (int y = 0; y < mask.height; ++y) {
+    const auto* row = static_cast<const uint8_t*>(mask.data) + y * mask.stride_bytes;
+    packMaskRow(row, mask.width, d.masked.row(y));
+    for (size_t i = 0; i < usable.words_per_row; ++i) d.masked.row(y)[i] &= usable.row(y)[i];
+  }
+  d.run(image, d.masked);
   return d.lines;
 }
 

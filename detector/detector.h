@@ -57,6 +57,11 @@ class Detector {
   /// small).
   [[nodiscard]] const std::vector<DetectedLine>& detect(const ImageView& image);
 
+  /// The same, of edges where the mask is not 0: a line ends where it is. The mask has one channel
+  /// of 8 bits and the image's size, else std::invalid_argument.
+  [[nodiscard]] const std::vector<DetectedLine>& detect(const ImageView& image,
+                                                        const ImageView& mask);
+
   [[nodiscard]] const StageTimes& times() const;
   [[nodiscard]] const Camera& camera() const;
 

@@ -557,6 +557,43 @@ TEST(Detector, WrongViewsAreRefusedWithBothSizes) {
               testing::HasSubstr("aligned"));
 }
 
+TEST(Detector, MaskedPartsGiveNoLines) {
+  const Camera camera = test::testCameras()[2].camera;
+  const auto image =
+      test::toU8(test::render(test::randomScene(3, 9, 2, sceneAngle(camera)), camera), 1, 2);
+  const int w = camera.width(), h = camera.height();
+  for (const auto& options : {DetectorOptions{}, DetectorOptions::paper()}) {
+    Detector detector(camera, options);
+    const std::vector<DetectedLine> all = detector.detect(test::viewOf(image, camera));
+    std::vector<uint8_t> mask(image.size(), 255);
+    const ImageView mask_view = test::viewOf(mask, camera);
+    const std::vector<DetectedLine> open = detector.detect(test::viewOf(image, camera), mask_view);
+    ASSERT_EQ(open.size(), all.size());
+    for (size_t i = 0; i < all.size(); ++i) EXPECT_EQ(open[i].arc.normal, all[i].arc.normal);
+    // A border at no multiple of 8.
+    const int split = w / 2 + 3;
+    for (int y = 0; y < h; ++y) {
+      for (int x = 0; x < split; ++x) mask[static_cast<size_t>(y * w + x)] = 0;
+    }
+    const auto& half = detector.detect(test::viewOf(image, camera), mask_view);
+    EXPECT_GE(half.size(), 5U);
+    EXPECT_LT(half.size(), all.size());
+    for (const auto& line : half) {
+      for (const Eigen::Vector2d& p : test::curveOf(camera, line)) EXPECT_GE(p.x(), split - 3);
+    }
+    std::fill(mask.begin(), mask.end(), uint8_t{0});
+    EXPECT_THAT(detector.detect(test::viewOf(image, camera), mask_view), testing::IsEmpty());
+    EXPECT_EQ(detector.detect(test::viewOf(image, camera)).size(), all.size());
+    ImageView wrong = mask_view;
+    wrong.width = w - 1;
+    EXPECT_THROW((void)detector.detect(test::viewOf(image, camera), wrong), std::invalid_argument);
+    wrong = mask_view;
+    wrong.type = PixelType::kU16;
+    wrong.stride_bytes = 2 * w;
+    EXPECT_THROW((void)detector.detect(test::viewOf(image, camera), wrong), std::invalid_argument);
+  }
+}
+
 TEST(DetectorOptions, OutOfRangeIsNamed) {
   const Camera camera = makeCamera("pinhole", std::array{100.0, 100.0, 32.0, 24.0}, 64, 48);
   const auto refusal = [&](const auto& change) {

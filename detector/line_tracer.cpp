@@ -17,6 +17,9 @@ constexpr float kMaxTangent = 0.325F;
 /// the edge stands alone: its neighbours would be seen, too.
 constexpr double kMaxNarrowSigmaPx = 0.2;
 constexpr double kAloneRatio[2] = {0.85, 1.25};
+/// Narrow over wide response from which an edge is sharper than EdgeProfiler::kBlurVariance: 1.16
+/// for one without any blur but the pixel's, whose offsets seem 1 / kLeastGain as large.
+constexpr double kSharpRatio = 1.05, kLeastGain = 0.64;
 /// Wide over narrow response: 1 for a step, 1.2 for one of blur 1.5 px, 1.3 for two alike that are
 /// 3 px apart, 1.7 for shading that rises evenly.
 constexpr float kMaxWideRatio = 1.45F;
@@ -212,7 +215,7 @@ void LineTracer::judge(Quad* quad) const {
                   turn <= kMaxTangent * std::abs(odd) + 2 * kTurnScatter * noise &&
                   std::abs(quad->mean.odd_wide) <=
                       kMaxWideRatio * std::abs(quad->mean.odd_narrow) + 2 * noise_.odd_wide;
-  quad->offset_px = quad->is_edge ? even / odd : 0;
+  quad->offset_px = quad->is_edge ? (wide_ ? 1 : offset_gain_) * even / odd : 0;
   // What a filter of fixed shape leaves of an edge of another blur, and of its neighbours.
   constexpr float kModelVariance = 0.03F * 0.03F;
   quad->variance_px2 = quad->is_edge ? noise * noise / (odd * odd) + kModelVariance : 0;
@@ -434,33 +437,43 @@ std::optional<TracedLine> LineTracer::trace(const PlanarPiece& piece,
   angle_rad_ = 0;
   wide_ = false;
   bound_px_ = 1.5F;  // chains are whole pixels
+  offset_gain_ = 1;
 
   // The plane of the piece from a few of its rows.
   constexpr uint32_t kProbes = 6;
   const uint32_t probes = std::min(kProbes, piece.nodes);
   std::array<Quad, 2> pair;
   double level = 0, wide_level = 0;
-  for (uint32_t i = 0; i < probes; ++i) {
-    const uint32_t node = piece.first_node + (2 * i + 1) * piece.nodes / (2 * probes);
-    Front front;
-    front.position = nodes[node].cast<double>();
-    // Eight rows around the node.
-    const RaySample sample = rays_.at(front.position.x(), front.position.y());
-    const Eigen::Vector2d g(sample.du.dot(normal_), sample.dv.dot(normal_));
-    const int a = std::abs(g.x()) >= std::abs(g.y()) ? 0 : 1;
-    if (!(std::abs(g[a]) > 0)) continue;
-    front.position[a] -= sample.ray.dot(normal_) / g[a];
-    front.position[1 - a] -= 4;
-    front.position[a] += 4 * g[1 - a] / g[a];
-    if (!evaluate(&front, +1, &pair)) continue;
-    for (const Quad& q : pair) {
-      if (!q.is_edge) continue;
-      add(q);
-      level += std::abs(static_cast<double>(q.mean.odd_narrow));
-      wide_level += std::abs(static_cast<double>(q.mean.odd_wide));
+  for (int round = 0; round < 2; ++round) {
+    moments_ = {};
+    points_ = 0;
+    level = wide_level = 0;
+    for (uint32_t i = 0; i < probes; ++i) {
+      const uint32_t node = piece.first_node + (2 * i + 1) * piece.nodes / (2 * probes);
+      Front front;
+      front.position = nodes[node].cast<double>();
+      // Eight rows around the node.
+      const RaySample sample = rays_.at(front.position.x(), front.position.y());
+      const Eigen::Vector2d g(sample.du.dot(normal_), sample.dv.dot(normal_));
+      const int a = std::abs(g.x()) >= std::abs(g.y()) ? 0 : 1;
+      if (!(std::abs(g[a]) > 0)) continue;
+      front.position[a] -= sample.ray.dot(normal_) / g[a];
+      front.position[1 - a] -= 4;
+      front.position[a] += 4 * g[1 - a] / g[a];
+      if (!evaluate(&front, +1, &pair)) continue;
+      for (const Quad& q : pair) {
+        if (!q.is_edge) continue;
+        add(q);
+        level += std::abs(static_cast<double>(q.mean.odd_narrow));
+        wide_level += std::abs(static_cast<double>(q.mean.odd_wide));
+      }
     }
+    if (points_ < 2 || !refit()) return std::nullopt;
+    if (level <= kSharpRatio * wide_level) break;
+    // Sharper than the filters expect: offsets are smaller than they seem.
+    const double gain = wide_level * wide_level / (level * level);
+    offset_gain_ = static_cast<float>(std::max(gain, kLeastGain));
   }
-  if (points_ < 2 || !refit()) return std::nullopt;
   const double tolerance = 2 * static_cast<double>(noise_.odd_narrow) * std::sqrt(points_);
   const bool stands_alone = wide_level >= kAloneRatio[0] * level - tolerance &&
                             wide_level <= kAloneRatio[1] * level + tolerance;

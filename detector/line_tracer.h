@@ -24,8 +24,9 @@ struct TracedLine {
   Eigen::Vector3d middle_ray;        ///< Of a point between them: tells which way round.
   double length_px;                  ///< Along the curve.
   double rms_px, max_px;             ///< Distances of the edge points from the curve.
-  bool is_arc;                       ///< Bends with a radius below min_bend_radius_px.
-  int polarity;                      ///< +1: brighter on the side fit.normal points to.
+  bool is_inside;  ///< All of it is well inside the image: neither end is at the border or rim.
+  bool is_arc;     ///< Bends with a radius below min_bend_radius_px.
+  int polarity;    ///< +1: brighter on the side fit.normal points to.
   double score;
 };
 
@@ -40,15 +41,20 @@ class LineTracer {
   LineTracer(const RayTable& rays, const ValidationOptions& options);
 
   /// Takes the image for the traces that follow, and measures its noise.
+  /// @param usable  Where edges may be.
+  /// @param seen  Not set near the border of the image or the rim.
   /// @param min_contrast  What an edge must have, in grey levels.
-  void setImage(const GreyPixels& pixels, const BitRows& usable, double min_contrast);
+  void setImage(const GreyPixels& pixels,
+                const BitRows& usable,
+                const BitRows& seen,
+                double min_contrast);
   [[nodiscard]] const ResponseNoise& noise() const { return noise_; }
 
   /// From the middle of the piece in both directions, four rows (columns) at a time. Four rows show
   /// an edge if the mean response is that of a step of either sign above the noise, within the
   /// bound of the residuals of the curve. The plane is refitted as the line grows. The line ends
   /// where more than max_gap_px show no edge; a gap is only crossed to reach at least kMinRunPx
-  /// more. A line that still shows an edge where the usable part of the image ends is taken to go
+  /// more. A line that still shows an edge where the camera's image ends is taken to go
   /// on to the border or rim itself, but at most max_gap_px. No value if fewer than min_length_px
   /// remain.
   [[nodiscard]] std::optional<TracedLine> trace(const PlanarPiece& piece,
@@ -80,7 +86,7 @@ class LineTracer {
     bool has_slope = false;  // of the eight rows before, which crossed the same way
     double slope = 0, bend = 0;
     bool ended = false;
-    bool at_border = false;  // of the usable part of the image
+    bool at_border = false;  // where the camera ends
   };
   struct End {
     Eigen::Vector2d px;
@@ -101,7 +107,7 @@ class LineTracer {
   static void cutTail(std::vector<Quad>* quads);
 
   const RayTable& rays_;
-  const BitRows* usable_ = nullptr;
+  const BitRows *usable_ = nullptr, *seen_ = nullptr;
   ValidationOptions options_;
   EdgeProfiler profiler_;
   GreyPixels pixels_;
@@ -113,6 +119,7 @@ class LineTracer {
   Eigen::Vector3d normal_;
   bool wide_ = false;  // which filters judge
   float bound_px_ = 1;
+  float offset_gain_ = 1;  // of this line's sharpness
   int points_ = 0, points_at_fit_ = 0;
   double angle_rad_ = 0;
 };

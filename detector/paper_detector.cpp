@@ -72,7 +72,8 @@ void PaperDetector::addPolygon(std::span<const Eigen::Vector2d> pixels,
                               fit->normal,
                               group_rays_.front(),
                               group_rays_[group_rays_.size() / 2],
-                              group_rays_.back());
+                              group_rays_.back(),
+                              false);
   if (!arc) return;
   DetectedLine& line = lines->emplace_back();
   line.arc = *arc;

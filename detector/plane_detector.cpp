@@ -101,8 +101,12 @@ void PlaneDetector::traceAll(std::vector<DetectedLine>* lines) {
     if (isClaimed(piece)) continue;
     const auto traced = tracer_.trace(piece, splitter_.nodes());
     if (!traced || traced->score < v.min_score || traced->is_arc || mostlyClaimed()) continue;
-    const auto arc = visibleArc(
-        rays_.camera(), traced->fit.normal, traced->from_ray, traced->middle_ray, traced->to_ray);
+    const auto arc = visibleArc(rays_.camera(),
+                                traced->fit.normal,
+                                traced->from_ray,
+                                traced->middle_ray,
+                                traced->to_ray,
+                                traced->is_inside);
     if (!arc) continue;
     claim();
     DetectedLine& line = lines->emplace_back();
@@ -118,6 +122,7 @@ void PlaneDetector::traceAll(std::vector<DetectedLine>* lines) {
 
 void PlaneDetector::detect(const ImageView& image,
                            const BitRows& usable,
+                           const BitRows& seen,
                            std::vector<DetectedLine>* lines,
                            StageTimes* times) {
   {
@@ -134,7 +139,7 @@ void PlaneDetector::detect(const ImageView& image,
     splitter_.split(chains_, &pieces_);
   }
   const StopWatch stage(&times->validation);
-  tracer_.setImage(pixels_, usable, options_.edges.min_gradient / kGradientPerContrast);
+  tracer_.setImage(pixels_, usable, seen, options_.edges.min_gradient / kGradientPerContrast);
   traceAll(lines);
 }
 

@@ -20,9 +20,10 @@ class PlaneDetector {
   PlaneDetector(const RayTable& rays, const DetectorOptions& options);
 
   /// Appends lines, whose from_px and to_px are left to the caller, and adds to the times of the
-  /// stages. Edges are only looked for where `usable` is set.
+  /// stages. Edges are only looked for where `usable` is set; where `seen` is not, the camera ends.
   void detect(const ImageView& image,
               const BitRows& usable,
+              const BitRows& seen,
               std::vector<DetectedLine>* lines,
               StageTimes* times);
 

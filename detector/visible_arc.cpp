@@ -63,10 +63,11 @@ std::optional<Arc> visibleArc(const Camera& camera,
                               const Eigen::Vector3d& plane_normal,
                               const Eigen::Vector3d& from_ray,
                               const Eigen::Vector3d& middle_ray,
-                              const Eigen::Vector3d& to_ray) {
+                              const Eigen::Vector3d& to_ray,
+                              bool is_inside) {
   const auto traced = arcOnPlane(plane_normal, from_ray, to_ray);
   if (!traced || !isOnArc(*traced, middle_ray)) return std::nullopt;
-  return clippedToImage(camera, *traced);
+  return is_inside ? traced : clippedToImage(camera, *traced);
 }
 
 double curveLengthPx(const Camera& camera, const Arc& arc) {

@@ -11,11 +11,13 @@ namespace dlsd {
 
 /// What the image shows of a plane from ray to ray by way of a third between them. No value if that
 /// is nothing, or a half turn or more: no 3D line.
+/// @param is_inside  The whole curve is known to lie in image and domain: nothing needs to be cut.
 [[nodiscard]] std::optional<Arc> visibleArc(const Camera& camera,
                                             const Eigen::Vector3d& plane_normal,
                                             const Eigen::Vector3d& from_ray,
                                             const Eigen::Vector3d& middle_ray,
-                                            const Eigen::Vector3d& to_ray);
+                                            const Eigen::Vector3d& to_ray,
+                                            bool is_inside);
 
 /// Length of the arc's image, to 1 %.
 [[nodiscard]] double curveLengthPx(const Camera& camera, const Arc& arc);
