@@ -23,6 +23,7 @@ struct Arguments {
   std::vector<std::string> cameras;
   std::string shard = "0/1";
   std::string encoding = "linear";
+  std::vector<std::string> planes;
   GenerateOptions options;
 };
 
@@ -61,7 +62,10 @@ int run(Arguments& arguments) {
     }
   }
   readShard(arguments.shard, &options);
-  options.sensor.encoding = arguments.encoding == "srgb" ? Encoding::kSrgb : Encoding::kLinear;
+  options.sensor.encoding = encodingFromName(arguments.encoding).value_or(Encoding::kLinear);
+  for (const std::string& name : arguments.planes) {
+    options.planes.push_back(planeFromName(name).value_or(PlaneKind::kDepth));
+  }
   options.check();
 
   GenerateResult result{};
@@ -114,10 +118,49 @@ Run addGenerate(CLI::App& command) {
   command
       .add_option("--psf", options.sensor.psf_sigma_px, "Optical blur, standard deviation in px")
       ->capture_default_str();
-  command.add_option("--encoding", arguments->encoding, "Light to grey levels: linear or srgb")
+  command
+      .add_option("--defocus",
+                  options.sensor.defocus_radius_px,
+                  "Blur of an unfocused lens, radius of its disc in px")
+      ->capture_default_str();
+  command
+      .add_option("--vignetting",
+                  options.sensor.vignetting,
+                  "Share of the light lost in the image's corners, 0 to 1")
+      ->capture_default_str();
+  command.add_option("--exposure", options.sensor.exposure, "Factor on the light")
+      ->capture_default_str();
+  command
+      .add_option("--full-well",
+                  options.sensor.full_well_electrons,
+                  "Electrons that make a pixel white, for shot noise; 0: none")
+      ->capture_default_str();
+  command
+      .add_option("--shot-seed",
+                  options.sensor.shot_noise_seed,
+                  "Another one: other shot noise on the same pictures")
+      ->transform(wholeNumber<uint64_t>(0, UINT64_MAX))
+      ->capture_default_str();
+  command.add_option("--noise-seed", options.sensor.read_noise_seed, "The same for --noise")
+      ->transform(wholeNumber<uint64_t>(0, UINT64_MAX))
+      ->capture_default_str();
+  command
+      .add_option(
+          "--encoding", arguments->encoding, "Light to grey levels: linear, srgb or gamma (2.2)")
       ->type_name("NAME")
       ->capture_default_str()
-      ->check(CLI::IsMember({"linear", "srgb"}));
+      ->check(CLI::IsMember({"linear", "srgb", "gamma"}));
+  command.add_option("--bits", options.sensor.bits, "Of the images: 8 or 16")
+      ->check(CLI::IsMember({8, 16}))
+      ->capture_default_str();
+  command
+      .add_option("--planes",
+                  arguments->planes,
+                  fmt::format("Per-pixel ground truth to write besides, as .npy, with commas: {}",
+                              fmt::join(planeNames(), ", ")))
+      ->type_name("NAMES")
+      ->delimiter(',')
+      ->check(CLI::IsMember(planeNames()));
   command.add_option("--jobs", options.jobs, "Threads; 0: one per core")
       ->transform(wholeNumber(0, 1024))
       ->capture_default_str();
@@ -129,6 +172,7 @@ Run addGenerate(CLI::App& command) {
       "  dlsd generate --camera wide.yaml --count 100 --out data\n"
       "  dlsd generate --camera rig.yaml:cam0 --camera rig.yaml:cam1 --scene paper --noise 2 --out "
       "data\n"
+      "  dlsd generate --camera wide.yaml --planes depth,normal,df --out data\n"
       "  dlsd generate --camera wide.yaml --count 1000 --shard 0/4 --out data   (and 1/4, 2/4, "
       "3/4)");
   return [arguments] { return run(*arguments); };

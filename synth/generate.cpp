@@ -25,6 +25,7 @@
 #include "synth/dataset/json_fields.h"
 #include "synth/dataset/random.h"
 #include "synth/labels.h"
+#include "synth/planes.h"
 #include "synth/raycaster.h"
 #include "synth/render.h"
 #include "synth/scene.h"
@@ -65,6 +66,12 @@ std::string imagePath(uint64_t index) {
 std::string labelPath(uint64_t index) {
   return "labels/" + frameName(index) + ".json";
 }
+std::string planeFolder(PlaneKind kind) {
+  return "planes/" + std::string(toString(kind));
+}
+std::string planePath(PlaneKind kind, uint64_t index) {
+  return planeFolder(kind) + "/" + frameName(index) + ".npy";
+}
 std::string cameraPath(const std::string& name) {
   return "cameras/" + name + ".yaml";
 }
@@ -99,11 +106,18 @@ class RayTables {
   std::deque<Entry> entries_;
 };
 
-Frame makeFrame(const GenerateOptions& options, uint64_t index, const CameraRays& rays) {
+PixelResponse responseOf(const SensorOptions& sensor) {
+  return {sensor.psf_sigma_px, sensor.defocus_radius_px};
+}
+
+Frame makeFrame(const GenerateOptions& options,
+                uint64_t index,
+                const CameraRays& rays,
+                const PixelResponse& response) {
   const auto& [name, camera] = options.cameras[index % options.cameras.size()];
   const SceneView view = makeSceneView(options.scene, options.seed, index);
   const Raycaster raycaster(view.scene);
-  const Shader shader(view.scene);
+  const Shader shader(view.scene, &raycaster);
   const std::vector<EdgeSpan> spans = visibleSpans(view.scene, raycaster, camera, view.pose);
   Labels labels =
       makeLabels(view.scene, raycaster, shader, camera, view.pose, options.sensor, spans);
@@ -115,11 +129,13 @@ Frame makeFrame(const GenerateOptions& options, uint64_t index, const CameraRays
                                   rays,
                                   view.pose,
                                   spans,
-                                  hashCounters({options.seed, index, kSamplingStream}))
+                                  hashCounters({options.seed, index, kSamplingStream}),
+                                  response)
                        .radiance;
-  blur(options.sensor, camera.width(), camera.height(), &frame.radiance);
   frame.image = exposeImage(
       options.sensor, camera.width(), camera.height(), frame.radiance, options.seed, index);
+  frame.planes =
+      renderPlanes(view.scene, raycaster, camera, view.pose, labels.lines, options.planes);
   LabelRecord& record = frame.labels;
   record.image = imagePath(index);
   record.camera = cameraPath(name);
@@ -148,20 +164,24 @@ ordered_json configJson(const GenerateOptions& options) {
                        {"height", camera.height()},
                        {"max_field_angle", camera.maxFieldAngleLimit()}});
   }
-  return {{"scene", presetVersion(options.scene)},
-          {"seed", options.seed},
-          {"count", options.count},
-          {"sensor", toJson(options.sensor)},
-          {"cameras", std::move(cameras)}};
+  ordered_json config{{"scene", presetVersion(options.scene)},
+                      {"seed", options.seed},
+                      {"count", options.count},
+                      {"sensor", toJson(options.sensor)},
+                      {"cameras", std::move(cameras)}};
+  for (const PlaneKind kind : options.planes) config["planes"].push_back(toString(kind));
+  return config;
 }
 
 struct FrameHashes {
   std::string image, labels;
+  std::vector<std::string> planes;  ///< In the order of the options.
 };
 
 /// Frames' hashes by frame index, and what makes a manifest of them.
 struct Manifest {
   ordered_json config;
+  std::vector<PlaneKind> planes;
   std::vector<std::pair<std::string, std::string>> cameras;  ///< File and sha256.
   std::vector<std::pair<uint64_t, FrameHashes>> frames;      ///< By index.
 
@@ -177,6 +197,11 @@ struct Manifest {
                                 {"image_sha256", hashes.image},
                                 {"labels", labelPath(index)},
                                 {"labels_sha256", hashes.labels}});
+      for (size_t k = 0; k < planes.size(); ++k) {
+        json["frames"].back()["planes"].push_back({{"kind", toString(planes[k])},
+                                                   {"file", planePath(planes[k], index)},
+                                                   {"sha256", hashes.planes[k]}});
+      }
     }
     return json.dump(1) + "\n";
   }
@@ -202,7 +227,8 @@ std::string difference(const ordered_json& there, const ordered_json& here) {
 
 /// Manifests in the folder; throws InputError if one of them is of another dataset.
 std::map<std::string, Manifest> readManifests(const std::string& folder,
-                                              const ordered_json& config) {
+                                              const ordered_json& config,
+                                              const std::vector<PlaneKind>& planes) {
   std::map<std::string, Manifest> manifests;
   std::error_code error;
   for (const auto& entry : fs::directory_iterator(folder, error)) {
@@ -223,11 +249,15 @@ std::map<std::string, Manifest> readManifests(const std::string& folder,
     const ordered_json there = json["config"].raw();
     // Compared as unordered objects: the order of keys means nothing.
     if (nlohmann::json(there) != nlohmann::json(config)) refuseFolder(difference(there, config));
-    Manifest manifest;
-    manifest.config = config;
+    Manifest manifest{config, planes, {}, {}};
     for (const JsonField& frame : json["frames"].array()) {
-      manifest.frames.push_back({frame["index"].counter(),
-                                 {frame["image_sha256"].text(), frame["labels_sha256"].text()}});
+      FrameHashes hashes{frame["image_sha256"].text(), frame["labels_sha256"].text(), {}};
+      if (!planes.empty()) {
+        for (const JsonField& plane : frame["planes"].array(planes.size(), planes.size())) {
+          hashes.planes.push_back(plane["sha256"].text());
+        }
+      }
+      manifest.frames.push_back({frame["index"].counter(), std::move(hashes)});
     }
     manifests.emplace(name, std::move(manifest));
   }
@@ -251,15 +281,21 @@ bool isJournal(const std::string& name) {
 }
 
 std::string journalLine(uint64_t index, const FrameHashes& hashes) {
-  return std::to_string(index) + ' ' + hashes.image + ' ' + hashes.labels + '\n';
+  std::string line = std::to_string(index) + ' ' + hashes.image + ' ' + hashes.labels;
+  for (const std::string& plane : hashes.planes) line += ' ' + plane;
+  return line + '\n';
 }
 
 /// What unfinished runs have made: one line per frame whose files are in place.
 class Journal {
  public:
   /// Reads all journals of the folder; throws InputError if one is of another configuration.
-  Journal(const std::string& folder, const std::string& own_name, const ordered_json& config)
-      : path_(folder + "/" + own_name),
+  Journal(const std::string& folder,
+          const std::string& own_name,
+          const ordered_json& config,
+          size_t plane_count)
+      : plane_count_(plane_count),
+        path_(folder + "/" + own_name),
         head_(std::string(kJournalFormat) + ' ' + sha256Hex(std::string(kVersion) + config.dump()) +
               '\n') {
     std::error_code error;
@@ -300,29 +336,40 @@ class Journal {
 
  private:
   /// Lines that are complete; the last one may be torn.
-  static std::map<uint64_t, FrameHashes> framesIn(const std::string& text) {
+  [[nodiscard]] std::map<uint64_t, FrameHashes> framesIn(const std::string& text) const {
     std::map<uint64_t, FrameHashes> frames;
     for (size_t begin = 0, end; (end = text.find('\n', begin)) != std::string::npos;
          begin = end + 1) {
       std::istringstream line(text.substr(begin, end - begin));
       uint64_t index = 0;
       FrameHashes hashes;
-      if (line >> index >> hashes.image >> hashes.labels && hashes.image.size() == 64 &&
-          hashes.labels.size() == 64) {
-        frames[index] = hashes;
+      hashes.planes.resize(plane_count_);
+      bool complete = line >> index >> hashes.image >> hashes.labels && hashes.image.size() == 64 &&
+                      hashes.labels.size() == 64;
+      for (std::string& plane : hashes.planes) {
+        complete = complete && line >> plane && plane.size() == 64;
       }
+      if (complete) frames[index] = std::move(hashes);
     }
     return frames;
   }
 
+  size_t plane_count_;
   std::string path_, head_;
   std::map<uint64_t, FrameHashes> known_, own_;
   std::ofstream file_;
 };
 
+/// The folders of the frames' files.
+std::vector<std::string> frameFolders(const GenerateOptions& options) {
+  std::vector<std::string> folders{"images", "labels"};
+  for (const PlaneKind kind : options.planes) folders.push_back(planeFolder(kind));
+  return folders;
+}
+
 /// Removes what a killed run left half written of this shard's frames.
 void removeTemporaryFiles(const GenerateOptions& options) {
-  for (const char* folder : {"images", "labels"}) {
+  for (const std::string& folder : frameFolders(options)) {
     std::error_code error;
     std::vector<fs::path> leftovers;
     for (const auto& entry : fs::directory_iterator(options.out + "/" + folder, error)) {
@@ -368,12 +415,18 @@ void GenerateOptions::check() const {
   requireInt("shard_count", shard_count, 1, kMaxCount);
   requireInt("shard_index", shard_index, 0, shard_count - 1);
   sensor.check();
+  for (size_t k = 0; k < planes.size(); ++k) {
+    if (std::count(planes.begin(), planes.end(), planes[k]) > 1) {
+      throw std::invalid_argument("planes: \"" + std::string(toString(planes[k])) +
+                                  "\" is given twice");
+    }
+  }
 }
 
 Frame renderFrame(const GenerateOptions& options, uint64_t index) {
   options.check();
   const CameraRays rays(options.cameras[index % options.cameras.size()].second);
-  return makeFrame(options, index, rays);
+  return makeFrame(options, index, rays, responseOf(options.sensor));
 }
 
 GenerateResult generateDataset(const GenerateOptions& options,
@@ -382,14 +435,15 @@ GenerateResult generateDataset(const GenerateOptions& options,
   if (options.out.empty()) throw std::invalid_argument("out: a folder is needed");
   const ordered_json config = configJson(options);
   const std::string own_name = manifestName(options.shard_index, options.shard_count);
-  std::map<std::string, Manifest> earlier = readManifests(options.out, config);
-  Journal journal(options.out, journalName(options.shard_index, options.shard_count), config);
+  std::map<std::string, Manifest> earlier = readManifests(options.out, config, options.planes);
+  Journal journal(options.out,
+                  journalName(options.shard_index, options.shard_count),
+                  config,
+                  options.planes.size());
 
-  Manifest manifest;
-  manifest.config = config;
-  for (const char* folder : {"images", "labels", "cameras"}) {
-    makeFolders(options.out + "/" + folder);
-  }
+  Manifest manifest{config, options.planes, {}, {}};
+  makeFolders(options.out + "/cameras");
+  for (const std::string& folder : frameFolders(options)) makeFolders(options.out + "/" + folder);
   removeTemporaryFiles(options);
   for (const auto& [name, camera] : options.cameras) {
     const std::string text = kalibrYaml({{"cam0", camera}});
@@ -405,6 +459,7 @@ GenerateResult generateDataset(const GenerateOptions& options,
   for (const auto& [name, old] : earlier) known.insert(old.frames.begin(), old.frames.end());
 
   RayTables tables(options);
+  const PixelResponse response = responseOf(options.sensor);
   std::mutex mutex;
   GenerateProgress progress{0, static_cast<int>(manifest.frames.size())};
   GenerateResult result{0, 0};
@@ -413,18 +468,27 @@ GenerateResult generateDataset(const GenerateOptions& options,
     const std::string image_path = options.out + "/" + imagePath(index);
     const std::string label_path = options.out + "/" + labelPath(index);
     const auto old = known.find(index);
-    const bool keep = old != known.end() && fileHas(image_path, old->second.image) &&
-                      fileHas(label_path, old->second.labels);
+    bool keep = old != known.end() && fileHas(image_path, old->second.image) &&
+                fileHas(label_path, old->second.labels);
+    for (size_t k = 0; keep && k < options.planes.size(); ++k) {
+      keep =
+          fileHas(options.out + "/" + planePath(options.planes[k], index), old->second.planes[k]);
+    }
     if (keep) {
       hashes = old->second;
     } else {
       const auto rays = tables.get(index % options.cameras.size());
-      const Frame frame = makeFrame(options, index, *rays);
+      const Frame frame = makeFrame(options, index, *rays, response);
       const std::string png = encodePng(frame.image);
       const std::string labels = toJson(frame.labels).dump() + "\n";
       writeFileAtomically(image_path, png);
       writeFileAtomically(label_path, labels);
-      hashes = {sha256Hex(png), sha256Hex(labels)};
+      hashes = {sha256Hex(png), sha256Hex(labels), {}};
+      for (const Plane& plane : frame.planes) {
+        const std::string npy = encodeNpy(plane);
+        writeFileAtomically(options.out + "/" + planePath(plane.kind, index), npy);
+        hashes.planes.push_back(sha256Hex(npy));
+      }
     }
     const std::lock_guard lock(mutex);
     if (!keep) journal.add(index, hashes);
@@ -452,8 +516,8 @@ GenerateResult generateDataset(const GenerateOptions& options,
   }
 
   // The last shard to finish finds all manifests and merges them; the bytes are those of one run.
-  earlier = readManifests(options.out, config);
-  Manifest merged{config, manifest.cameras, {}};
+  earlier = readManifests(options.out, config, options.planes);
+  Manifest merged{config, options.planes, manifest.cameras, {}};
   for (int i = 0; i < options.shard_count; ++i) {
     const auto it = earlier.find(manifestName(i, options.shard_count));
     if (it == earlier.end()) return result;

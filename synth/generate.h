@@ -10,6 +10,7 @@
 #include "cameras/camera.h"
 #include "synth/dataset/image.h"
 #include "synth/dataset/records.h"
+#include "synth/planes.h"
 #include "synth/sensor.h"
 
 namespace dlsd {
@@ -22,7 +23,8 @@ struct GenerateOptions {
   int count = 1;    ///< Frames, in [1, 10000000].
   std::string out;  ///< Dataset folder; created if absent.
   SensorOptions sensor;
-  int jobs = 0;         ///< Threads; 0 = all cores.
+  std::vector<PlaneKind> planes;  ///< Written besides images and labels; none twice.
+  int jobs = 0;                   ///< Threads; 0 = all cores.
   int shard_index = 0;  ///< This run makes the frames i with i mod shard_count == shard_index ...
   int shard_count = 1;  ///< ... and, if > 1, manifest-i-of-n.json in place of manifest.json.
 
@@ -38,8 +40,8 @@ struct GenerateResult {
   int written, kept;  ///< Frames.
 };
 
-/// Writes images/NNNNNN.png, labels/NNNNNN.json, cameras/NAME.yaml and, last, the manifest. Every
-/// file is written atomically; its bytes depend on the options but not on jobs, shards or earlier
+/// Writes images/NNNNNN.png, labels/NNNNNN.json, planes/KIND/NNNNNN.npy, cameras/NAME.yaml and,
+/// last, the manifest. Every file is written atomically; its bytes depend on the options but not on jobs, shards or earlier
 /// runs. Until then journal.txt (of a shard: journal-i-of-n.txt) names the frames that are
 /// finished, with their sha256, so that an interrupted or killed run goes on where it was. Frames
 /// that a manifest or journal of the same configuration names are verified by sha256 and kept;
@@ -53,8 +55,9 @@ GenerateResult generateDataset(const GenerateOptions& options,
 /// One frame in memory.
 struct Frame {
   LabelRecord labels;
-  Image image;                  ///< Gray, 8 bit.
-  std::vector<float> radiance;  ///< Linear light after optical blur, before noise; row-major.
+  Image image;                  ///< Grey.
+  std::vector<float> radiance;  ///< Linear light after optical blur, before the sensor; row-major.
+  std::vector<Plane> planes;    ///< In the order of the options.
 };
 
 /// Frame `index` as generateDataset would write it; `out`, `count` and jobs are not looked at.

@@ -314,9 +314,20 @@ TEST(Labels, JunctionsAreWhereLabelsMeet) {
   }
 }
 
+/// EUCM, double sphere, and a panorama of the whole sphere.
+std::vector<std::pair<std::string, Camera>> moreCameras() {
+  const std::array<double, 6> eucm{0.63, 1.1, 260, 261, 318, 242};
+  const std::array<double, 6> double_sphere{-0.2, 0.59, 190, 191, 318, 242};
+  const std::array<double, 4> panorama{512 / M_PI, 512 / M_PI, 511.5, 255.5};
+  return {{"eucm", makeCamera("eucm", eucm, 640, 480)},
+          {"double_sphere", makeCamera("double_sphere", double_sphere, 640, 480)},
+          {"equirectangular", makeCamera("equirectangular", panorama, 1024, 512)}};
+}
+
 // The spans are arcs in space: another lens at the same place sees the same ones.
 TEST(Labels, AgreeBetweenCameraModels) {
-  const auto cameras = testCameras();
+  auto cameras = testCameras();
+  for (const auto& camera : moreCameras()) cameras.push_back(camera);
   size_t compared = 0;
   for (size_t a = 0; a < cameras.size(); ++a) {
     const size_t b = (a + 1) % cameras.size();
@@ -348,6 +359,52 @@ TEST(Labels, AgreeBetweenCameraModels) {
     }
   }
   EXPECT_GT(compared, 500U);
+}
+
+// What leaves a panorama on the right comes in on the left, at the same height; nothing is drawn
+// across.
+TEST(Labels, OfAPanoramaGoOnBehindTheSeam) {
+  const Camera camera = moreCameras().back().second;
+  size_t seams = 0, points = 0;
+  for (uint64_t index = 0; index < 3; ++index) {
+    const Made m = make(camera, 102, index);
+    ASSERT_GT(m.labels.lines.size(), 100U);
+    for (const LabelLine& line : m.labels.lines) {
+      for (size_t end = 0; end < 2; ++end) {
+        const Vector2d& p = end == 0 ? line.points.front() : line.points.back();
+        // A panorama has no border and no rim.
+        EXPECT_TRUE(line.ends[end] != EndKind::kBorder && line.ends[end] != EndKind::kRim);
+        if (line.ends[end] != EndKind::kSeam) continue;
+        ++seams;
+        EXPECT_NEAR(std::abs(p.x() - 511.5), 512, 1e-5);
+        const auto goesOn = [&](const LabelLine& other) {
+          for (size_t k = 0; k < 2; ++k) {
+            const Vector2d& q = k == 0 ? other.points.front() : other.points.back();
+            if (other.edge == line.edge && other.ends[k] == EndKind::kSeam &&
+                std::abs(q.y() - p.y()) < 1e-5 && std::abs(std::abs(q.x() - p.x()) - 1024) < 1e-5) {
+              return true;
+            }
+          }
+          return false;
+        };
+        EXPECT_EQ(std::count_if(m.labels.lines.begin(), m.labels.lines.end(), goesOn), 1)
+            << index << " line " << line.id;
+      }
+      for (size_t i = 0; i < line.points.size(); ++i) {
+        ++points;
+        const auto ray = camera.unproject(line.points[i]);
+        ASSERT_TRUE(ray);
+        EXPECT_LT(std::abs(line.normal.dot(*ray)), 2e-8);
+        if (i == 0) continue;
+        // The drawn line, too: half way between two points it is as near as they are asked to be.
+        const auto middle = camera.unproject((line.points[i - 1] + line.points[i]) / 2);
+        ASSERT_TRUE(middle);
+        EXPECT_LT(std::abs(line.normal.dot(*middle)) * 512 / M_PI, 0.0101) << "line " << line.id;
+      }
+    }
+  }
+  EXPECT_GT(seams, 30U);
+  EXPECT_GT(points, 5000U);
 }
 
 /// A bright wall at z = 2 m ahead of a camera at the origin that looks along +z of the world,

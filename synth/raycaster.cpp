@@ -7,9 +7,14 @@
 #endif
 #include <tbb/task_arena.h>
 
+#include <Eigen/Geometry>
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <limits>
+#include <map>
 #include <string>
+#include <utility>
 
 #include "cameras/calibration/files.h"
 
@@ -78,10 +83,101 @@ void intersect16(const int* valid, RTCScene scene, RTCRayHit16* rays) {
 
 constexpr unsigned kTriangles = 0, kSpheres = 1, kDiscs = 2;
 
+struct Mesh {
+  std::vector<Eigen::Vector3f> vertices;
+  std::vector<Triangle> triangles;
+};
+
+/// The scene's triangles, with the sides of long rods cut across: boxes around the pieces are so
+/// much smaller that rays get twice as fast.
+class RodCutter {
+ public:
+  RodCutter(const Scene& scene, Mesh* mesh) : mesh_(mesh) { mesh_->vertices = scene.vertices; }
+
+  /// A side with corners a, b at one end and c, d at the other (d beyond a).
+  void addSide(const Triangle& abc, int d, int pieces) {
+    const auto [a, b, c] = abc.vertices;
+    const int left = cutsOf(a, d, pieces), right = cutsOf(b, c, pieces);
+    const auto place = [&](int cuts, int from, int to, int i) {
+      // Cuts are numbered from the end with the smaller vertex index.
+      return i == 0 ? from : i == pieces ? to : cuts + (from < to ? i : pieces - i) - 1;
+    };
+    for (int i = 0; i < pieces; ++i) {
+      const int p = place(left, a, d, i), q = place(right, b, c, i);
+      const int r = place(right, b, c, i + 1), s = place(left, a, d, i + 1);
+      mesh_->triangles.push_back({{p, q, r}, abc.face});
+      mesh_->triangles.push_back({{p, r, s}, abc.face});
+    }
+  }
+
+ private:
+  /// Index of the first of pieces - 1 new vertices on an edge, which both of its sides share.
+  int cutsOf(int v0, int v1, int pieces) {
+    const auto [entry, is_new] = cuts_.try_emplace(std::minmax(v0, v1), 0);
+    if (!is_new) return entry->second;
+    entry->second = static_cast<int>(mesh_->vertices.size());
+    const Eigen::Vector3d from = vertex(entry->first.first), to = vertex(entry->first.second);
+    for (int i = 1; i < pieces; ++i) mesh_->vertices.push_back(cutNear(from, to, i, pieces));
+    return entry->second;
+  }
+
+  /// A float point as near to the edge as can be had: rounding moves the best of 16 tried a quarter
+  /// as far as any one of them, at most 2e-7 m within 16 m of the origin.
+  static Eigen::Vector3f cutNear(const Eigen::Vector3d& from,
+                                 const Eigen::Vector3d& to,
+                                 int i,
+                                 int pieces) {
+    constexpr int kTries = 16;
+    Eigen::Vector3f best = Eigen::Vector3f::Zero();
+    double best_distance2 = std::numeric_limits<double>::infinity();
+    const Eigen::Vector3d axis = (to - from).normalized();
+    for (int k = 0; k < kTries; ++k) {
+      const Eigen::Vector3d exact = from + (to - from) * ((i + 0.002 * k) / pieces);
+      const Eigen::Vector3f rounded = exact.cast<float>();
+      const double distance2 = axis.cross(rounded.cast<double>() - exact).squaredNorm();
+      if (distance2 < best_distance2) {
+        best_distance2 = distance2;
+        best = rounded;
+      }
+    }
+    return best;
+  }
+
+  [[nodiscard]] Eigen::Vector3d vertex(int v) const {
+    return mesh_->vertices[static_cast<size_t>(v)].cast<double>();
+  }
+
+  Mesh* mesh_;
+  std::map<std::pair<int, int>, int> cuts_;
+};
+
+Mesh meshOf(const Scene& scene) {
+  constexpr double kPieceMetres = 0.5;
+  std::vector<int> pieces_of_face(scene.faces.size(), 1);
+  for (const Rod& rod : scene.rods) {
+    const int pieces = static_cast<int>(std::ceil((rod.to - rod.from).norm() / kPieceMetres));
+    // The last two faces are the caps.
+    std::fill_n(pieces_of_face.begin() + rod.first_face, rod.face_count - 2, pieces);
+  }
+  Mesh mesh;
+  RodCutter cutter(scene, &mesh);
+  for (size_t i = 0; i < scene.triangles.size(); ++i) {
+    const Triangle& t = scene.triangles[i];
+    const int pieces = pieces_of_face[static_cast<size_t>(t.face)];
+    if (pieces == 1) {
+      mesh.triangles.push_back(t);
+      continue;
+    }
+    // Sides are pairs of triangles (a, b, c), (a, c, d).
+    cutter.addSide(t, scene.triangles[++i].vertices[2], pieces);
+  }
+  return mesh;
+}
+
 }  // namespace
 
 struct Raycaster::Impl {
-  explicit Impl(const Scene& scene) : triangle_faces(scene.triangles.size()) {
+  explicit Impl(const Scene& scene) {
     rtc_scene = rtcNewScene(device());
     if (rtc_scene == nullptr) throw SystemError("the ray caster is out of memory");
     rtcSetSceneFlags(rtc_scene, RTC_SCENE_FLAG_ROBUST);
@@ -111,23 +207,25 @@ struct Raycaster::Impl {
   }
 
   void addTriangles(const Scene& scene) {
+    const Mesh mesh = meshOf(scene);
     const RTCGeometry geometry = rtcNewGeometry(device(), RTC_GEOMETRY_TYPE_TRIANGLE);
     auto* vertices = newBuffer<float>(geometry,
                                       RTC_BUFFER_TYPE_VERTEX,
                                       RTC_FORMAT_FLOAT3,
                                       3 * sizeof(float),
-                                      scene.vertices.size());
-    for (const Eigen::Vector3f& v : scene.vertices) {
+                                      mesh.vertices.size());
+    for (const Eigen::Vector3f& v : mesh.vertices) {
       for (int i = 0; i < 3; ++i) *vertices++ = v[i];
     }
     auto* indices = newBuffer<unsigned>(geometry,
                                         RTC_BUFFER_TYPE_INDEX,
                                         RTC_FORMAT_UINT3,
                                         3 * sizeof(unsigned),
-                                        scene.triangles.size());
-    for (size_t i = 0; i < scene.triangles.size(); ++i) {
-      for (const int v : scene.triangles[i].vertices) *indices++ = static_cast<unsigned>(v);
-      triangle_faces[i] = scene.triangles[i].face;
+                                        mesh.triangles.size());
+    triangle_faces.reserve(mesh.triangles.size());
+    for (const Triangle& triangle : mesh.triangles) {
+      for (const int v : triangle.vertices) *indices++ = static_cast<unsigned>(v);
+      triangle_faces.push_back(triangle.face);
     }
     attach(geometry, kTriangles);
   }
@@ -182,32 +280,64 @@ Raycaster::~Raycaster() = default;
 Raycaster::Raycaster(Raycaster&&) noexcept = default;
 Raycaster& Raycaster::operator=(Raycaster&&) noexcept = default;
 
+namespace {
+
+/// What is the same for all rays: filled plainly, which compilers turn into a few wide stores.
+void fillCommon(RTCRayHit16* rays) {
+  constexpr size_t kPacket = Raycaster::kPacket;
+  std::fill_n(rays->ray.time, kPacket, 0.0F);
+  std::fill_n(rays->ray.mask, kPacket, 0xffffffffU);
+  std::fill_n(rays->ray.id, kPacket, 0U);
+  std::fill_n(rays->ray.flags, kPacket, 0U);
+  std::fill_n(rays->hit.geomID, kPacket, RTC_INVALID_GEOMETRY_ID);
+  std::fill_n(rays->hit.instID[0], kPacket, RTC_INVALID_GEOMETRY_ID);
+}
+
+}  // namespace
+
 void Raycaster::castPacket(const Eigen::Vector3f& origin,
                            const float* x,
                            const float* y,
                            const float* z,
                            size_t count,
                            Hit* hits) const {
-  alignas(64) std::array<int, kPacket> active;
+  alignas(64) std::array<int, kPacket> active{};
+  std::fill_n(active.begin(), count, -1);
   RTCRayHit16 rays;
-  for (size_t i = 0; i < kPacket; ++i) {
-    active[i] = i < count ? -1 : 0;
-    const size_t k = i < count ? i : 0;
-    rays.ray.org_x[i] = origin.x();
-    rays.ray.org_y[i] = origin.y();
-    rays.ray.org_z[i] = origin.z();
-    rays.ray.dir_x[i] = x[k];
-    rays.ray.dir_y[i] = y[k];
-    rays.ray.dir_z[i] = z[k];
-    rays.ray.tnear[i] = 0;
-    rays.ray.tfar[i] = std::numeric_limits<float>::infinity();
-    rays.ray.time[i] = 0;
-    rays.ray.mask[i] = 0xffffffffU;
-    rays.ray.id[i] = 0;
-    rays.ray.flags[i] = 0;
-    rays.hit.geomID[i] = RTC_INVALID_GEOMETRY_ID;
-    rays.hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;
+  fillCommon(&rays);
+  std::fill_n(rays.ray.org_x, kPacket, origin.x());
+  std::fill_n(rays.ray.org_y, kPacket, origin.y());
+  std::fill_n(rays.ray.org_z, kPacket, origin.z());
+  if (count == kPacket) {
+    std::copy_n(x, kPacket, rays.ray.dir_x);
+    std::copy_n(y, kPacket, rays.ray.dir_y);
+    std::copy_n(z, kPacket, rays.ray.dir_z);
+  } else {
+    std::fill(std::copy_n(x, count, rays.ray.dir_x), rays.ray.dir_x + kPacket, 1.0F);
+    std::fill(std::copy_n(y, count, rays.ray.dir_y), rays.ray.dir_y + kPacket, 1.0F);
+    std::fill(std::copy_n(z, count, rays.ray.dir_z), rays.ray.dir_z + kPacket, 1.0F);
   }
+  std::fill_n(rays.ray.tnear, kPacket, 0.0F);
+  std::fill_n(rays.ray.tfar, kPacket, std::numeric_limits<float>::infinity());
+  intersect16(active.data(), impl_->rtc_scene, &rays);
+  for (size_t i = 0; i < count; ++i) {
+    hits[i] = impl_->hitOf(rays.hit.geomID[i], rays.hit.primID[i], rays.ray.tfar[i]);
+  }
+}
+
+void Raycaster::castPacket(const RayPacket& packet, size_t count, Hit* hits) const {
+  alignas(64) std::array<int, kPacket> active{};
+  std::fill_n(active.begin(), count, -1);
+  RTCRayHit16 rays;
+  fillCommon(&rays);
+  std::copy_n(packet.origin_x.data(), kPacket, rays.ray.org_x);
+  std::copy_n(packet.origin_y.data(), kPacket, rays.ray.org_y);
+  std::copy_n(packet.origin_z.data(), kPacket, rays.ray.org_z);
+  std::copy_n(packet.direction_x.data(), kPacket, rays.ray.dir_x);
+  std::copy_n(packet.direction_y.data(), kPacket, rays.ray.dir_y);
+  std::copy_n(packet.direction_z.data(), kPacket, rays.ray.dir_z);
+  std::copy_n(packet.min_distance.data(), kPacket, rays.ray.tnear);
+  std::copy_n(packet.max_distance.data(), kPacket, rays.ray.tfar);
   intersect16(active.data(), impl_->rtc_scene, &rays);
   for (size_t i = 0; i < count; ++i) {
     hits[i] = impl_->hitOf(rays.hit.geomID[i], rays.hit.primID[i], rays.ray.tfar[i]);

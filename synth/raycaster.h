@@ -2,6 +2,7 @@
 // Ray casting against a Scene, in world frame. raycaster.cpp is the only file that knows Embree.
 
 #include <Eigen/Core>
+#include <array>
 #include <cstddef>
 #include <memory>
 
@@ -18,10 +19,18 @@ struct Hit {
   float distance = 0;  ///< Along the ray, in lengths of its direction.
 };
 
+/// Rays with origins of their own, as a structure of arrays.
+struct RayPacket {
+  static constexpr size_t kSize = 16;
+  alignas(64) std::array<float, kSize> origin_x, origin_y, origin_z;
+  alignas(64) std::array<float, kSize> direction_x, direction_y, direction_z;
+  alignas(64) std::array<float, kSize> min_distance, max_distance;
+};
+
 /// Immutable after construction; may be used by many threads at once. The scene must outlive it.
 class Raycaster {
  public:
-  static constexpr size_t kPacket = 16;
+  static constexpr size_t kPacket = RayPacket::kSize;
 
   /// Throws SystemError if the ray caster refuses (out of memory).
   explicit Raycaster(const Scene& scene);
@@ -29,14 +38,17 @@ class Raycaster {
   Raycaster(Raycaster&&) noexcept;
   Raycaster& operator=(Raycaster&&) noexcept;
 
-  /// First hits of up to 16 coherent rays of unit direction from one origin. Results are those of
-  /// single rays (the caster's robust mode).
+  /// First hits of up to 16 coherent rays from one origin. Results are those of single rays (the
+  /// caster's robust mode).
   void castPacket(const Eigen::Vector3f& origin,
                   const float* x,
                   const float* y,
                   const float* z,
                   size_t count,
                   Hit* hits) const;
+
+  /// First hits of the first `count` rays at distances in (min_distance, max_distance).
+  void castPacket(const RayPacket& packet, size_t count, Hit* hits) const;
 
   /// First hit of one ray at a distance in (min_distance, max_distance).
   [[nodiscard]] Hit cast(const Eigen::Vector3f& origin,

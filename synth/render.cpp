@@ -4,243 +4,636 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
 
 #include "cameras/batch.h"
 #include "synth/dataset/random.h"
+#include "synth/parallel.h"
 
 namespace dlsd {
 namespace {
 
-/// Surface indices of corners without a hit and without a ray.
-constexpr int kNoRay = -2;
+/// Sights of pixels that nothing is known of yet, and of places without a ray.
+constexpr Sight kUnknown = -3, kNoRay = -2;
+/// Two grey levels at exposure 1: less is no step.
+constexpr float kStep = 2.0F / 255;
 
-/// Marks all pixels that a curve passes, and those it passes within kMargin.
+/// Counts the curves that pass each pixel.
 class PixelMask {
  public:
   PixelMask(int width, int height)
       : width_(width),
         height_(height),
-        marked_(static_cast<size_t>(width) * static_cast<size_t>(height), 0) {}
+        curves_(static_cast<size_t>(width) * static_cast<size_t>(height), 0) {}
 
-  void markCurve(const std::vector<Eigen::Vector2d>& curve) {
-    // Steps of a quarter pixel: between two of them a curve clips at most 1/8 px of a pixel's
-    // corner, which the margin covers.
-    for (size_t i = 1; i < curve.size(); ++i) {
-      const Eigen::Vector2d d = curve[i] - curve[i - 1];
-      const int steps = std::max(1, static_cast<int>(std::ceil(4 * d.norm())));
-      for (int k = 0; k <= steps; ++k) markAround(curve[i - 1] + d * k / steps, kMargin);
-    }
+  /// A curve's points, joined by straight pieces. Pixels of which it only cuts a corner, less than
+  /// kMinLengthPx long, are left out: that corner is at most 0.4 % of the pixel.
+  void addCurve(const std::vector<Eigen::Vector2d>& points) {
+    for (size_t i = 1; i < points.size(); ++i) addPiece(points[i - 1], points[i]);
+    count();
   }
 
-  void markAround(const Eigen::Vector2d& p, double margin) {
-    const int x0 = std::max(0, pixelOf(p.x() - margin));
-    const int x1 = std::min(width_ - 1, pixelOf(p.x() + margin));
-    const int y0 = std::max(0, pixelOf(p.y() - margin));
-    const int y1 = std::min(height_ - 1, pixelOf(p.y() + margin));
-    for (int y = y0; y <= y1; ++y) {
-      for (int x = x0; x <= x1; ++x) {
-        marked_[static_cast<size_t>(y) * static_cast<size_t>(width_) + static_cast<size_t>(x)] = 1;
-      }
+  /// Curves through a pixel: 0, 1, or 2 for more.
+  [[nodiscard]] int curves(size_t pixel) const { return curves_[pixel]; }
+  /// Whether no curve passes the pixels [x0, x1) x [y0, y1).
+  [[nodiscard]] bool isFree(int x0, int x1, int y0, int y1) const {
+    bool is_free = true;
+    for (int y = y0; y < y1; ++y) {
+      const uint8_t* row = curves_.data() + static_cast<size_t>(y) * static_cast<size_t>(width_);
+      for (int x = x0; x < x1; ++x) is_free = is_free && row[x] == 0;
     }
+    return is_free;
   }
-
-  [[nodiscard]] bool marked(size_t pixel) const { return marked_[pixel] != 0; }
 
  private:
-  static constexpr double kMargin = 0.15;
-  static int pixelOf(double x) {
-    return static_cast<int>(std::floor(std::clamp(x, -2.0, 1e6) + 0.5));
+  static constexpr double kMinLengthPx = 0.12;
+
+  /// Walks from pixel to pixel.
+  void addPiece(const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
+    const Eigen::Vector2d d = b - a;
+    const double length = d.norm();
+    if (!(length > 0) || !(a.cwiseAbs().maxCoeff() < 1e6) || !(length < 1e6)) return;
+    const Eigen::Vector2i last{pixelOf(b.x()), pixelOf(b.y())};
+    Eigen::Vector2i at{pixelOf(a.x()), pixelOf(a.y())};
+    // Fractions of the piece at which it goes on to the next column and row.
+    std::array<double, 2> next, stride;
+    std::array<int, 2> step;
+    for (int axis = 0; axis < 2; ++axis) {
+      const auto k = static_cast<size_t>(axis);
+      step[k] = d[axis] > 0 ? 1 : -1;
+      const bool moves = d[axis] != 0;
+      next[k] = moves ? (at[axis] + 0.5 * step[k] - a[axis]) / d[axis] : 2;
+      stride[k] = moves ? 1 / std::abs(d[axis]) : 2;
+    }
+    double t = 0;
+    for (int left = std::abs(last.x() - at.x()) + std::abs(last.y() - at.y()); left > 0; --left) {
+      const size_t axis = next[0] < next[1] ? 0 : 1;
+      const double end = std::clamp(next[axis], t, 1.0);
+      add(at, (end - t) * length);
+      t = end;
+      at[static_cast<int>(axis)] += step[axis];
+      next[axis] += stride[axis];
+    }
+    add(at, (1 - t) * length);
   }
+
+  void add(const Eigen::Vector2i& pixel, double length) {
+    if (pixel != pixel_) count();
+    pixel_ = pixel;
+    length_ += length;
+  }
+
+  /// Counts the curve in its last pixel.
+  void count() {
+    const bool inside =
+        pixel_.x() >= 0 && pixel_.y() >= 0 && pixel_.x() < width_ && pixel_.y() < height_;
+    if (inside && length_ >= kMinLengthPx) {
+      uint8_t& curves = curves_[static_cast<size_t>(pixel_.y()) * static_cast<size_t>(width_) +
+                                static_cast<size_t>(pixel_.x())];
+      curves = static_cast<uint8_t>(std::min(2, curves + 1));
+    }
+    length_ = 0;
+  }
+
+  static int pixelOf(double x) { return static_cast<int>(std::floor(x + 0.5)); }
 
   int width_, height_;
-  std::vector<uint8_t> marked_;
+  std::vector<uint8_t> curves_;
+  Eigen::Vector2i pixel_{-1, -1};  ///< Where the curve is, and its length there so far.
+  double length_ = 0;
 };
 
-/// Round things so small in the image that all corners may miss them are marked whole.
-void markSmallRounds(const Scene& scene, const Camera& camera, const Pose& pose, PixelMask* mask) {
-  constexpr double kSmallPx = 4;
-  const auto mark = [&](const Eigen::Vector3d& centre, double radius) {
-    const Eigen::Vector3d c = pose.toCam(centre);
-    const auto pixel = camera.project(c);
-    const auto J = camera.jacobian(c);
-    if (!pixel || !J || !(pixel->norm() < 1e6)) return;
-    const double radius_px = J->norm() * radius;
-    if (radius_px < kSmallPx) mask->markAround(*pixel, radius_px + 1);
+/// Adds the images of all circles and ellipses at which something may end, hidden or not.
+void addRoundOutlines(const Scene& scene, const Camera& camera, const Pose& pose, PixelMask* mask) {
+  std::vector<Eigen::Vector2d> curve;
+  // An ellipse with these half axes, in the camera frame.
+  const auto add = [&](const Eigen::Vector3d& centre,
+                       const Eigen::Vector3d& a,
+                       const Eigen::Vector3d& b) {
+    // The angle it covers, in px at the image's centre: chords of less than 0.01 px.
+    const double radius = std::max(a.norm(), b.norm());
+    const double distance = std::max(centre.norm() - radius, 0.05 * radius);
+    const auto J = camera.jacobian(Eigen::Vector3d::UnitZ());
+    const double radius_px = (J ? J->norm() : camera.width()) * std::min(3.0, radius / distance);
+    const int pieces = std::clamp(static_cast<int>(25 * std::sqrt(radius_px)), 16, 2000);
+    curve.clear();
+    for (int k = 0; k <= pieces; ++k) {
+      const double phi = 2 * M_PI * k / pieces;
+      const auto pixel = camera.project(centre + std::cos(phi) * a + std::sin(phi) * b);
+      // At the seam of a panorama it jumps to the other side.
+      const bool goes_on =
+          pixel && (curve.empty() || (*pixel - curve.back()).norm() < camera.width() / 4.0);
+      if (!goes_on) {
+        mask->addCurve(curve);
+        curve.clear();
+      }
+      if (pixel) curve.push_back(*pixel);
+    }
+    mask->addCurve(curve);
   };
-  for (const Sphere& s : scene.spheres) {
-    mark(s.centre.cast<double>(), static_cast<double>(s.radius));
+  for (const Sphere& sphere : scene.spheres) {
+    // The circle in which the cone from the camera touches the sphere.
+    const Eigen::Vector3d centre = pose.toCam(sphere.centre.cast<double>());
+    const double distance = centre.norm();
+    const double sine = static_cast<double>(sphere.radius) / distance;
+    if (!(sine < 1)) continue;
+    const double radius = static_cast<double>(sphere.radius) * std::sqrt(1 - sine * sine);
+    const Eigen::Vector3d a = centre.unitOrthogonal() * radius;
+    add(centre * (1 - sine * sine), a, centre.cross(a) / distance);
   }
-  for (const Disc& d : scene.discs) {
-    mark(d.centre.cast<double>(), static_cast<double>(d.radius));
+  for (const Disc& disc : scene.discs) {
+    const Eigen::Vector3d normal = pose.cam_from_world * disc.normal.cast<double>();
+    const Eigen::Vector3d a = normal.unitOrthogonal() * static_cast<double>(disc.radius);
+    add(pose.toCam(disc.centre.cast<double>()), a, normal.cross(a));
   }
   for (const Face& face : scene.faces) {
+    if (face.normal.dot(pose.position_in_world - face.origin) <= 0) continue;
     for (const Decal& d : face.decals) {
-      if (d.shape == DecalShape::kEllipse) mark(face.at(d.centre), d.half.maxCoeff());
+      if (d.shape != DecalShape::kEllipse) continue;
+      const Eigen::Vector3d x = face.e1 * d.axis.x() + face.e2 * d.axis.y();
+      const Eigen::Vector3d y = face.normal.cross(x);
+      add(pose.toCam(face.at(d.centre)),
+          pose.cam_from_world * x * d.half.x(),
+          pose.cam_from_world * y * d.half.y());
     }
   }
 }
 
-/// Casts rays from one point in packets and shades them.
-class RayGun {
+/// Up to kFineSamples rays from the camera, cast in packets and shaded one by one.
+class RayBatch {
  public:
-  RayGun(const Raycaster& raycaster, const Shader& shader, const Pose& pose)
+  RayBatch(const Raycaster& raycaster, const Shader& shader, const Pose& pose)
       : raycaster_(raycaster),
         shader_(shader),
         origin_(pose.position_in_world),
-        origin_f_(pose.position_in_world.cast<float>()),
         world_from_cam_(pose.cam_from_world.transpose().cast<float>()) {}
 
-  void add(const Eigen::Vector3f& ray_in_cam) {
-    const Eigen::Vector3f d = (world_from_cam_ * ray_in_cam).normalized();
-    x_[count_] = d.x();
-    y_[count_] = d.y();
-    z_[count_] = d.z();
+  [[nodiscard]] Eigen::Vector3f toWorld(const Eigen::Vector3f& ray_in_cam) const {
+    return world_from_cam_ * ray_in_cam;
+  }
+
+  void clear() { count_ = 0; }
+  void add(const Eigen::Vector3f& ray_in_world) {
+    x_[count_] = ray_in_world.x();
+    y_[count_] = ray_in_world.y();
+    z_[count_] = ray_in_world.z();
     ++count_;
   }
-  [[nodiscard]] bool full() const { return count_ == Raycaster::kPacket; }
-  [[nodiscard]] size_t count() const { return count_; }
+  /// A full batch: rays interpolated between those of a pixel's corners (row by row) at the
+  /// fractions u, v.
+  void setBilinear(const std::array<Eigen::Vector3f, 4>& corners, const float* u, const float* v) {
+    const Eigen::Vector3f du = corners[1] - corners[0], dv = corners[2] - corners[0];
+    const Eigen::Vector3f duv = corners[3] - corners[2] - du;
+    for (size_t k = 0; k < kFineSamples; ++k) {
+      const float uv = u[k] * v[k];
+      x_[k] = corners[0].x() + u[k] * du.x() + v[k] * dv.x() + uv * duv.x();
+      y_[k] = corners[0].y() + u[k] * du.y() + v[k] * dv.y() + uv * duv.y();
+      z_[k] = corners[0].z() + u[k] * du.z() + v[k] * dv.z() + uv * duv.z();
+    }
+    count_ = kFineSamples;
+  }
 
-  /// Casts what was added; then hits are read by index, until the next add after clear().
-  void fire() {
-    if (count_ > 0) {
-      raycaster_.castPacket(origin_f_, x_.data(), y_.data(), z_.data(), count_, hits_.data());
+  /// Casts the rays [from, to), from a multiple of a packet, and looks what they see.
+  void cast(size_t from, size_t to) {
+    for (size_t k = from; k < to; k += Raycaster::kPacket) {
+      const size_t count = std::min(Raycaster::kPacket, to - k);
+      const float *x = x_.data() + k, *y = y_.data() + k, *z = z_.data() + k;
+      raycaster_.castPacket(origin_.cast<float>(), x, y, z, count, hits_.data() + k);
+      for (size_t i = k; i < k + count; ++i) {
+        sights_[i] = shader_.surfaceAt(hits_[i], origin_, ray(i).cast<double>());
+      }
+      if (shader_.hasShadows()) {
+        shader_.addShadows(hits_.data() + k, origin_, x, y, z, count, sights_.data() + k);
+      }
     }
   }
-  void clear() { count_ = 0; }
+  void cast() { cast(0, count_); }
 
-  [[nodiscard]] int surface(size_t i) const {
-    return shader_.surfaceAt(hits_[i], origin_, direction(i));
+  [[nodiscard]] size_t count() const { return count_; }
+  [[nodiscard]] Sight sight(size_t i) const { return sights_[i]; }
+  [[nodiscard]] float radiance(size_t i) const { return radiance(i, ray(i)); }
+  /// In another direction than that of ray i, on the surface that it has hit.
+  [[nodiscard]] float radiance(size_t i, const Eigen::Vector3f& direction) const {
+    return shader_.radiance(hits_[i], origin_, direction.cast<double>(), sights_[i]);
   }
-  [[nodiscard]] float radiance(size_t i, int surface) const {
-    return shader_.radiance(hits_[i], origin_, direction(i), surface);
-  }
-  /// Shading varies slowly over a pixel, so one sample may speak for its surface.
   [[nodiscard]] bool isFlat(size_t i) const { return hits_[i].kind != HitKind::kSphere; }
+  [[nodiscard]] Eigen::Vector3f ray(size_t i) const { return {x_[i], y_[i], z_[i]}; }
 
  private:
-  [[nodiscard]] Eigen::Vector3d direction(size_t i) const {
-    return Eigen::Vector3f(x_[i], y_[i], z_[i]).cast<double>();
-  }
-
   const Raycaster& raycaster_;
   const Shader& shader_;
   Eigen::Vector3d origin_;
-  Eigen::Vector3f origin_f_;
   Eigen::Matrix3f world_from_cam_;
   size_t count_ = 0;
-  alignas(64) std::array<float, Raycaster::kPacket> x_{}, y_{}, z_{};
-  std::array<Hit, Raycaster::kPacket> hits_{};
+  alignas(64) std::array<float, kFineSamples> x_, y_, z_;
+  std::array<Hit, kFineSamples> hits_;
+  std::array<Sight, kFineSamples> sights_;
 };
 
-struct CornerRow {
-  std::vector<int> surface;
+/// What pixels show in their centres, row-major; kUnknown where a curve or the domain's rim passes.
+struct Pixels {
+  std::vector<Sight> sight;
   std::vector<float> radiance;
 };
 
-void castCorners(const CameraRays& rays, int j, RayGun* gun, CornerRow* row) {
-  const int columns = rays.width() + 1;
-  row->surface.resize(static_cast<size_t>(columns));
-  row->radiance.resize(static_cast<size_t>(columns));
-  std::array<size_t, Raycaster::kPacket> slots{};
-  const auto flush = [&] {
-    gun->fire();
-    for (size_t k = 0; k < gun->count(); ++k) {
-      const int surface = gun->surface(k);
-      row->surface[slots[k]] = surface;
-      row->radiance[slots[k]] = gun->radiance(k, surface);
-    }
-    gun->clear();
-  };
-  gun->clear();
-  for (int i = 0; i < columns; ++i) {
-    const auto slot = static_cast<size_t>(i);
-    if (!rays.cornerValid(i, j)) {
-      row->surface[slot] = kNoRay;
-      row->radiance[slot] = 0;
-      continue;
-    }
-    slots[gun->count()] = slot;
-    gun->add(rays.cornerRay(i, j));
-    if (gun->full()) flush();
-  }
-  flush();
-}
+/// A first look at a band of rows. Blocks of pixels without a curve whose corners agree are filled
+/// from these corners; other pixels without a curve get a ray through their centre.
+class FirstLook {
+ public:
+  /// @param fill_blocks  Whether all that may end within a block is in the mask.
+  FirstLook(const CameraRays& rays, const PixelMask& mask, const RayBatch& batch, bool fill_blocks)
+      : rays_(rays), mask_(mask), batch_(batch), fill_blocks_(fill_blocks) {}
 
-/// Sample k of the lattice comes as number m, so that any first few are spread over the pixel.
-constexpr std::array<int, kFineSamples> bitReversedOrder() {
-  std::array<int, kFineSamples> order{};
+  void look(int first, int end, Pixels* pixels) {
+    castCorners(first, end);
+    for (int y0 = first; y0 < end; y0 += kBlock) {
+      for (int x0 = 0; x0 < rays_.width(); x0 += kBlock) {
+        const int x1 = std::min(rays_.width(), x0 + kBlock), y1 = std::min(end, y0 + kBlock);
+        if (!fillBlock(x0, x1, y0, y1, (y0 - first) / kBlock, pixels)) {
+          castCentres(x0, x1, y0, y1, pixels);
+        }
+      }
+    }
+  }
+
+ private:
+  static constexpr int kBlock = CameraRays::kBlock;
+  static_assert(kBlock * kBlock == Raycaster::kPacket && kBandRows % kBlock == 0);
+
+  struct Corner {
+    Sight sight = kNoRay;
+    float radiance = 0;
+  };
+
+  /// Corners of the blocks of the band, in packets of neighbours.
+  void castCorners(int first, int end) {
+    columns_ = (rays_.width() + kBlock - 1) / kBlock + 1;
+    const int rows = (end - first + kBlock - 1) / kBlock + 1;
+    corners_.assign(static_cast<size_t>(columns_ * rows), Corner());
+    std::array<size_t, Raycaster::kPacket> slots{};
+    constexpr int kSide = 4;
+    for (int r0 = 0; r0 < rows; r0 += kSide) {
+      for (int c0 = 0; c0 < columns_; c0 += kSide) {
+        batch_.clear();
+        for (int r = r0; r < std::min(rows, r0 + kSide); ++r) {
+          for (int c = c0; c < std::min(columns_, c0 + kSide); ++c) {
+            const int i = std::min(rays_.width(), c * kBlock);
+            const int j = std::min(end, first + r * kBlock);
+            if (!rays_.cornerValid(i, j)) continue;
+            slots[batch_.count()] = static_cast<size_t>(r * columns_ + c);
+            batch_.add(batch_.toWorld(rays_.cornerRay(i, j)));
+          }
+        }
+        batch_.cast();
+        for (size_t k = 0; k < batch_.count(); ++k) {
+          corners_[slots[k]] = {batch_.sight(k), batch_.radiance(k)};
+        }
+      }
+    }
+  }
+
+  bool fillBlock(int x0, int x1, int y0, int y1, int row, Pixels* pixels) const {
+    const auto width = static_cast<size_t>(rays_.width());
+    const CameraRays::Block block = rays_.block(x0, y0);
+    if (block == CameraRays::Block::kPartlyValid || !fill_blocks_) return false;
+    const Corner* above = corners_.data() + static_cast<size_t>(row * columns_ + x0 / kBlock);
+    const Corner* below = above + columns_;
+    const auto [darkest, brightest] =
+        std::minmax({above[0].radiance, above[1].radiance, below[0].radiance, below[1].radiance});
+    const Sight sight = above[0].sight;
+    if (above[1].sight != sight || below[0].sight != sight || below[1].sight != sight ||
+        brightest - darkest > kStep || !mask_.isFree(x0, x1, y0, y1)) {
+      return false;
+    }
+    for (int y = y0; y < y1; ++y) {
+      const float b = (static_cast<float>(y - y0) + 0.5F) / static_cast<float>(y1 - y0);
+      const float left = (1 - b) * above[0].radiance + b * below[0].radiance;
+      const float right = (1 - b) * above[1].radiance + b * below[1].radiance;
+      for (int x = x0; x < x1; ++x) {
+        const float a = (static_cast<float>(x - x0) + 0.5F) / static_cast<float>(x1 - x0);
+        const size_t pixel = static_cast<size_t>(y) * width + static_cast<size_t>(x);
+        pixels->sight[pixel] = sight;
+        pixels->radiance[pixel] = (1 - a) * left + a * right;
+      }
+    }
+    return true;
+  }
+
+  void castCentres(int x0, int x1, int y0, int y1, Pixels* pixels) {
+    std::array<size_t, Raycaster::kPacket> slots{};
+    batch_.clear();
+    for (int y = y0; y < y1; ++y) {
+      for (int x = x0; x < x1; ++x) {
+        const size_t pixel =
+            static_cast<size_t>(y) * static_cast<size_t>(rays_.width()) + static_cast<size_t>(x);
+        if (mask_.curves(pixel) > 0) continue;
+        const int valid_corners = rays_.validCorners(x, y);
+        if (valid_corners == 4) {
+          slots[batch_.count()] = pixel;
+          batch_.add(batch_.toWorld(rays_.centreRay(x, y)));
+        } else if (valid_corners == 0) {
+          pixels->sight[pixel] = kNoRay;
+        }
+      }
+    }
+    batch_.cast();
+    for (size_t k = 0; k < batch_.count(); ++k) {
+      pixels->sight[slots[k]] = batch_.sight(k);
+      pixels->radiance[slots[k]] = batch_.radiance(k);
+    }
+  }
+
+  const CameraRays& rays_;
+  const PixelMask& mask_;
+  RayBatch batch_;
+  bool fill_blocks_;
+  int columns_ = 0;  ///< Of corners_.
+  std::vector<Corner> corners_;
+};
+
+/// Positions of the samples in a pixel, in 1 / PixelResponse::kPositions px: a rank-1 lattice. Both
+/// projections hit each of the 64 strata once, so edges along the axes are as fine as 1/64 px, and
+/// 19 keeps the points apart in between (the best generator for 64). In bit-reversed order, so that
+/// any first few are spread over the pixel.
+constexpr int kStratum = PixelResponse::kPositions / kFineSamples;
+struct SamplePositions {
+  std::array<int, kFineSamples> u, v;
+};
+/// The lattice in its eight mirrorings. Edges along one of its directions (113 degrees for one of
+/// them) are seen coarsely, 0.031 px rms; as each pixel draws one of the eight, such an edge is not
+/// unlucky in all of its pixels.
+constexpr std::array<SamplePositions, 8> samplePositions() {
+  constexpr int kGenerator = 19;
+  std::array<SamplePositions, 8> all{};
   for (int m = 0; m < kFineSamples; ++m) {
     int k = 0;
     for (int bit = 1, rest = m; bit < kFineSamples; bit *= 2, rest /= 2) k = 2 * k + rest % 2;
-    order[static_cast<size_t>(m)] = k;
+    const int u = k * kStratum, v = k * kGenerator % kFineSamples * kStratum;
+    for (size_t way = 0; way < all.size(); ++way) {
+      const int a = (way & 1) != 0 ? PixelResponse::kPositions - kStratum - u : u;
+      const int b = (way & 2) != 0 ? PixelResponse::kPositions - kStratum - v : v;
+      all[way].u[static_cast<size_t>(m)] = (way & 4) != 0 ? b : a;
+      all[way].v[static_cast<size_t>(m)] = (way & 4) != 0 ? a : b;
+    }
   }
-  return order;
+  return all;
 }
 
-/// Radiance of one surface within a pixel: shaded at its first `limit` samples, counted at all.
-struct SurfaceShare {
-  int surface;
-  int samples, shaded;
-  double sum;
-  [[nodiscard]] double mean() const { return sum / shaded; }
+/// A pixel seen through its samples: a constant, and samples that differ from it.
+struct FinePixel {
+  struct Sample {
+    int u, v;     ///< Position, 0 .. PixelResponse::kPositions - 1.
+    float value;  ///< What it adds to the constant, over the number of samples.
+  };
+  float constant = 0;
+  size_t count = 0;
+  std::array<Sample, kFineSamples> samples;
 };
 
-/// Mean over the pixel's square of kFineSamples samples.
-float finePixel(
-    const CameraRays& rays, int i, int j, uint64_t shift_bits, int shade_limit, RayGun* gun) {
-  // Rank-1 lattice: both projections hit each of the 64 strata once, so edges along the axes are as
-  // fine as 1/64 px, and 19 keeps the points apart in between (the best generator for 64).
-  constexpr int kGenerator = 19;
-  static constexpr std::array<int, kFineSamples> kOrder = bitReversedOrder();
-  const double shift_u = static_cast<double>(shift_bits >> 40) * 0x1p-24;
-  const double shift_v = static_cast<double>((shift_bits >> 8) & 0xffffffU) * 0x1p-24;
-  const bool exact = rays.isExact(i, j);
-  std::array<Eigen::Vector3f, 4> corners;
-  if (!exact) {
-    corners = {rays.cornerRay(i, j),
-               rays.cornerRay(i + 1, j),
-               rays.cornerRay(i, j + 1),
-               rays.cornerRay(i + 1, j + 1)};
-  }
-  std::array<SurfaceShare, kFineSamples> shares;
-  size_t share_count = 0;
-  int samples = 0;
-  gun->clear();
-  for (int m = 0; m < kFineSamples; ++m) {
-    const int k = kOrder[static_cast<size_t>(m)];
-    double u = (k + 0.5) / kFineSamples + shift_u;
-    double v = ((k * kGenerator) % kFineSamples + 0.5) / kFineSamples + shift_v;
-    u -= std::floor(u);
-    v -= std::floor(v);
-    if (exact) {
-      const auto ray = rays.camera().unproject({i - 0.5 + u, j - 0.5 + v});
-      if (ray) gun->add(ray->cast<float>());
+/// Looks at single pixels with many samples.
+class FineSampler {
+ public:
+  /// @param shade_all  Shade every sample, not one for all of a flat surface.
+  FineSampler(const CameraRays& rays, const RayBatch& batch, bool shade_all)
+      : rays_(rays), batch_(batch), shade_all_(shade_all) {}
+
+  /// @param may_stop  One packet is enough if it shows surfaces without a step between them.
+  void look(int i, int j, uint64_t shift_bits, bool may_stop, FinePixel* pixel) {
+    prepare(i, j, shift_bits);
+    size_t samples = kFineSamples;
+    if (may_stop && batch_.count() == kFineSamples) {
+      gather(0, Raycaster::kPacket);
+      shade();
+      if (share_count_ > 1 && spread() <= kStep) {
+        samples = Raycaster::kPacket;
+      } else {
+        gather(Raycaster::kPacket, kFineSamples);
+        shade();
+      }
     } else {
-      const auto a = static_cast<float>(u), b = static_cast<float>(v);
-      gun->add((1 - b) * ((1 - a) * corners[0] + a * corners[1]) +
-               b * ((1 - a) * corners[2] + a * corners[3]));
+      gather(0, batch_.count());
+      shade();
     }
-    if (!gun->full() && m + 1 < kFineSamples) continue;
-    gun->fire();
-    for (size_t s = 0; s < gun->count(); ++s) {
-      const int surface = gun->surface(s);
+    // The surface with the most samples is the constant; the first one wins a tie.
+    size_t most = 0;
+    for (size_t k = 1; k < share_count_; ++k) {
+      if (shares_[k].samples > shares_[most].samples) most = k;
+    }
+    pixel->constant = shares_[most].radiance;
+    pixel->count = 0;
+    const float weight = 1 / static_cast<float>(samples);
+    for (size_t k = 0; k < samples; ++k) {
+      const Share& share = shares_[share_of_[k]];
+      const float value = share.one_for_all ? share.radiance : values_[k];
+      if (value == pixel->constant) continue;
+      pixel->samples[pixel->count++] = {u_[k], v_[k], (value - pixel->constant) * weight};
+    }
+  }
+
+ private:
+  /// A sight within the pixel.
+  struct Share {
+    Sight sight = 0;
+    bool one_for_all = true;  ///< Its radiance stands for all samples.
+    int samples = 0;
+    size_t first = 0;  ///< Its first ray.
+    Eigen::Vector3f ray_sum{0, 0, 0};
+    float radiance_sum = 0;
+    float radiance = 0;
+  };
+
+  /// Rays of all samples; slots_ says which sample each ray belongs to.
+  void prepare(int i, int j, uint64_t shift_bits) {
+    static constexpr auto kLattices = samplePositions();
+    const SamplePositions& lattice = kLattices[shift_bits >> 61];
+    constexpr int kMask = PixelResponse::kPositions - 1;
+    const int shift_u = static_cast<int>(shift_bits >> 16) & kMask;
+    const int shift_v = static_cast<int>(shift_bits >> 32) & kMask;
+    for (size_t k = 0; k < kFineSamples; ++k) {
+      u_[k] = (lattice.u[k] + shift_u) & kMask;
+      v_[k] = (lattice.v[k] + shift_v) & kMask;
+      a_[k] = (static_cast<float>(u_[k]) + 0.5F) / PixelResponse::kPositions;
+      b_[k] = (static_cast<float>(v_[k]) + 0.5F) / PixelResponse::kPositions;
+      slots_[k] = k;
+    }
+    share_count_ = 0;
+    if (rays_.isExact(i, j)) {
+      unproject(i, j);
+    } else {
+      batch_.setBilinear({batch_.toWorld(rays_.cornerRay(i, j)),
+                          batch_.toWorld(rays_.cornerRay(i + 1, j)),
+                          batch_.toWorld(rays_.cornerRay(i, j + 1)),
+                          batch_.toWorld(rays_.cornerRay(i + 1, j + 1))},
+                         a_.data(),
+                         b_.data());
+    }
+  }
+
+  void unproject(int i, int j) {
+    std::array<double, kFineSamples> u, v, x, y, z;
+    std::array<uint8_t, kFineSamples> valid;
+    for (size_t k = 0; k < kFineSamples; ++k) {
+      u[k] = i - 0.5 + static_cast<double>(a_[k]);
+      v[k] = j - 0.5 + static_cast<double>(b_[k]);
+    }
+    unprojectAll(rays_.camera(), u, v, x, y, z, valid);
+    batch_.clear();
+    for (size_t k = 0; k < kFineSamples; ++k) {
+      if (valid[k] == 0) continue;
+      slots_[batch_.count()] = k;
+      batch_.add(batch_.toWorld(Eigen::Vector3d(x[k], y[k], z[k]).cast<float>()));
+    }
+    if (batch_.count() == kFineSamples) return;
+    // Samples without a ray are black.
+    shares_[0] = Share();
+    shares_[0].sight = kNoRay;
+    shares_[0].samples = static_cast<int>(kFineSamples - batch_.count());
+    share_count_ = 1;
+    share_of_.fill(0);
+  }
+
+  /// Casts rays and sorts them by surface.
+  void gather(size_t from, size_t to) {
+    batch_.cast(from, to);
+    for (size_t k = from; k < to; ++k) {
+      const Sight sight = batch_.sight(k);
       size_t at = 0;
-      while (at < share_count && shares[at].surface != surface) ++at;
-      if (at == share_count) shares[share_count++] = {surface, 0, 0, 0};
-      SurfaceShare& share = shares[at];
+      while (at < share_count_ && shares_[at].sight != sight) ++at;
+      Share& share = shares_[at];
+      if (at == share_count_) {
+        share = Share();
+        share.sight = sight;
+        share.one_for_all = batch_.isFlat(k) && !shade_all_;
+        share.first = k;
+        ++share_count_;
+      }
+      share_of_[slots_[k]] = static_cast<uint8_t>(at);
       ++share.samples;
-      if (share.shaded < shade_limit || !gun->isFlat(s)) {
-        share.sum += static_cast<double>(gun->radiance(s, surface));
-        ++share.shaded;
+      if (share.one_for_all) {
+        share.ray_sum += batch_.ray(k);
+      } else {
+        values_[slots_[k]] = batch_.radiance(k);
+        share.radiance_sum += values_[slots_[k]];
       }
     }
-    samples += static_cast<int>(gun->count());
-    gun->clear();
   }
-  if (samples == 0) return 0;
-  double sum = 0;
-  for (size_t k = 0; k < share_count; ++k) sum += shares[k].samples * shares[k].mean();
-  return static_cast<float>(sum / samples);
+
+  /// Radiance of the surfaces. Over a pixel it changes linearly on a flat one, so that in the
+  /// middle of its samples it is the mean.
+  void shade() {
+    for (size_t k = 0; k < share_count_; ++k) {
+      Share& share = shares_[k];
+      if (share.sight == kNoRay) continue;
+      share.radiance = share.one_for_all ? batch_.radiance(share.first, share.ray_sum)
+                                         : share.radiance_sum / static_cast<float>(share.samples);
+    }
+  }
+
+  /// Difference between the brightest and the darkest surface.
+  [[nodiscard]] float spread() const {
+    float lo = shares_[0].radiance, hi = lo;
+    for (size_t k = 1; k < share_count_; ++k) {
+      lo = std::min(lo, shares_[k].radiance);
+      hi = std::max(hi, shares_[k].radiance);
+    }
+    return hi - lo;
+  }
+
+  const CameraRays& rays_;
+  RayBatch batch_;
+  bool shade_all_;
+  std::array<int, kFineSamples> u_, v_;    ///< Positions of the samples.
+  std::array<float, kFineSamples> a_, b_;  ///< The same as fractions of the pixel.
+  std::array<size_t, kFineSamples> slots_;
+  std::array<uint8_t, kFineSamples> share_of_;
+  std::array<float, kFineSamples> values_;
+  size_t share_count_ = 0;
+  std::array<Share, kFineSamples + 1> shares_;
+};
+
+/// Light of fine pixels of one band of rows, spread over the pixels around them by the response.
+class SplatBand {
+ public:
+  /// Rows first - radius .. end + radius - 1 of the image.
+  SplatBand(const PixelResponse& response, int width, int height, int first, int end)
+      : response_(response),
+        width_(width),
+        height_(height),
+        first_(first),
+        stride_(static_cast<size_t>(width + 2 * response.radius()) + response.stride()),
+        light_(stride_ * static_cast<size_t>(end - first + 2 * response.radius()), 0.0F),
+        spread_(response.stride() * static_cast<size_t>(2 * response.radius() + 1)) {}
+
+  void add(int i, int j, const FinePixel& pixel) {
+    if (pixel.count == 0) return;
+    std::fill(spread_.begin(), spread_.end(), 0.0F);
+    const size_t taps = static_cast<size_t>(2 * response_.radius() + 1);
+    const size_t stride = response_.stride();
+    for (size_t term = 0; term < response_.terms(); ++term) {
+      for (size_t k = 0; k < pixel.count; ++k) {
+        const FinePixel::Sample& s = pixel.samples[k];
+        const float* across = response_.taps(term, s.u);
+        const float* down = response_.taps(term, s.v);
+        const float value = s.value * response_.sign(term);
+        float* out = spread_.data();
+        for (size_t y = 0; y < taps; ++y) {
+          const float weight = value * down[y];
+          for (size_t x = 0; x < stride; x += 8, out += 8) {
+            for (size_t lane = 0; lane < 8; ++lane) out[lane] += weight * across[x + lane];
+          }
+        }
+      }
+    }
+    // Border pixels continue the image as far as their light reaches it.
+    const int radius = response_.radius();
+    const int left = i == 0 ? radius : 0, right = i == width_ - 1 ? radius : 0;
+    const int up = j == 0 ? radius : 0, down = j == height_ - 1 ? radius : 0;
+    for (int y = j - up; y <= j + down; ++y) {
+      for (int x = i - left; x <= i + right; ++x) addSpread(x, y);
+    }
+  }
+
+  /// Light of a row of the image, or nullptr if it is out of reach.
+  [[nodiscard]] const float* row(int y) const {
+    const int k = y - first_ + response_.radius();
+    if (k < 0 || static_cast<size_t>(k) * stride_ >= light_.size()) return nullptr;
+    return light_.data() + static_cast<size_t>(k) * stride_ + response_.radius();
+  }
+
+ private:
+  void addSpread(int i, int j) {
+    const int radius = response_.radius(), stride = static_cast<int>(response_.stride());
+    for (int y = -radius; y <= radius; ++y) {
+      const int row_index = j + y - first_ + radius;
+      if (row_index < 0 || static_cast<size_t>(row_index) * stride_ >= light_.size()) continue;
+      float* out = light_.data() + static_cast<size_t>(row_index) * stride_;
+      const float* in = spread_.data() + static_cast<size_t>((y + radius) * stride);
+      const int from = std::max(0, -i), to = std::min(stride, static_cast<int>(stride_) - i);
+      for (int k = from; k < to; ++k) out[i + k] += in[k];
+    }
+  }
+
+  const PixelResponse& response_;
+  int width_, height_, first_;
+  size_t stride_;
+  std::vector<float> light_;
+  std::vector<float> spread_;
+};
+
+/// Pixels in which more than one surface may show: not seen yet, or unlike one of their neighbours.
+bool needsFineLook(const Pixels& pixels, int width, int height, int i, int j) {
+  const auto at = [&](int x, int y) {
+    return static_cast<size_t>(y) * static_cast<size_t>(width) + static_cast<size_t>(x);
+  };
+  const size_t here = at(i, j);
+  if (pixels.sight[here] == kUnknown) return true;
+  const auto differs = [&](size_t there) {
+    return pixels.sight[there] != kUnknown &&
+           (pixels.sight[there] != pixels.sight[here] ||
+            std::abs(pixels.radiance[there] - pixels.radiance[here]) > kStep);
+  };
+  return (i > 0 && differs(at(i - 1, j))) || (i + 1 < width && differs(at(i + 1, j))) ||
+         (j > 0 && differs(at(i, j - 1))) || (j + 1 < height && differs(at(i, j + 1)));
 }
 
 }  // namespace
@@ -263,6 +656,20 @@ CameraRays::CameraRays(const Camera& camera) : camera_(camera) {
       x_[j * columns + i] = ok ? static_cast<float>(x[i]) : 0;
       y_[j * columns + i] = ok ? static_cast<float>(y[i]) : 0;
       z_[j * columns + i] = ok ? static_cast<float>(z[i]) : 1;
+    }
+  }
+  block_columns_ = (width() + kBlock - 1) / kBlock;
+  for (int y0 = 0; y0 < height(); y0 += kBlock) {
+    for (int x0 = 0; x0 < width(); x0 += kBlock) {
+      const int x1 = std::min(width(), x0 + kBlock), y1 = std::min(height(), y0 + kBlock);
+      int valid_count = 0;
+      for (int j = y0; j <= y1; ++j) {
+        for (int i = x0; i <= x1; ++i) valid_count += cornerValid(i, j) ? 1 : 0;
+      }
+      const int all = (x1 - x0 + 1) * (y1 - y0 + 1);
+      blocks_.push_back(valid_count == all ? Block::kValid
+                        : valid_count == 0 ? Block::kInvalid
+                                           : Block::kPartlyValid);
     }
   }
   // The interpolated ray of each pixel's centre must project back onto it.
@@ -290,6 +697,15 @@ CameraRays::CameraRays(const Camera& camera) : camera_(camera) {
   }
 }
 
+Eigen::Vector3f CameraRays::centreRay(int i, int j) const {
+  if (isExact(i, j)) {
+    const auto ray = camera_.unproject({i, j});
+    if (ray) return ray->cast<float>();
+  }
+  return (cornerRay(i, j) + cornerRay(i + 1, j) + cornerRay(i, j + 1) + cornerRay(i + 1, j + 1)) /
+         4;
+}
+
 size_t CameraRays::exactCount() const {
   return static_cast<size_t>(std::count(exact_.begin(), exact_.end(), uint8_t{1}));
 }
@@ -301,40 +717,65 @@ Rendering renderRadiance(const Scene& scene,
                          const Pose& pose,
                          const std::vector<EdgeSpan>& spans,
                          uint64_t key,
+                         const PixelResponse& response,
                          Sampling sampling) {
   const int width = rays.width(), height = rays.height();
+  const auto w = static_cast<size_t>(width);
+  const bool adaptive = sampling == Sampling::kAdaptive;
+  const RayBatch prototype(raycaster, shader, pose);
   PixelMask mask(width, height);
-  if (sampling == Sampling::kAdaptive) {
-    for (const EdgeSpan& span : spans) mask.markCurve(span.curve);
-    markSmallRounds(scene, rays.camera(), pose, &mask);
+  Pixels pixels{std::vector<Sight>(w * static_cast<size_t>(height), kUnknown),
+                std::vector<float>(w * static_cast<size_t>(height), 0.0F)};
+  if (adaptive) {
+    for (const EdgeSpan& span : spans) mask.addCurve(span.curve);
+    addRoundOutlines(scene, rays.camera(), pose, &mask);
+    forEachBand(height, [&](int /*band*/, int first, int end) {
+      FirstLook(rays, mask, prototype, !shader.hasShadows()).look(first, end, &pixels);
+    });
   }
-  // Shading varies slowly within a pixel: four spread samples of a surface speak for all of them.
-  const int shade_limit = sampling == Sampling::kAdaptive ? 4 : kFineSamples;
+
   Rendering rendering;
-  rendering.radiance.resize(static_cast<size_t>(width) * static_cast<size_t>(height));
-  RayGun gun(raycaster, shader, pose);
-  CornerRow above, below;
-  castCorners(rays, 0, &gun, &above);
-  for (int j = 0; j < height; ++j) {
-    castCorners(rays, j + 1, &gun, &below);
-    for (int i = 0; i < width; ++i) {
-      const auto c = static_cast<size_t>(i);
-      const size_t pixel = static_cast<size_t>(j) * static_cast<size_t>(width) + c;
-      const int s = above.surface[c];
-      const bool one_surface =
-          s == above.surface[c + 1] && s == below.surface[c] && s == below.surface[c + 1];
-      float& out = rendering.radiance[pixel];
-      if (sampling == Sampling::kEverywhere || !one_surface || mask.marked(pixel)) {
-        out = finePixel(rays, i, j, hashCounters({key, pixel}), shade_limit, &gun);
-        ++rendering.fine_pixels;
-      } else {
-        out = (above.radiance[c] + above.radiance[c + 1] + below.radiance[c] +
-               below.radiance[c + 1]) /
-              4;
+  std::vector<float> constants(pixels.radiance.size());
+  std::vector<std::optional<SplatBand>> bands(static_cast<size_t>(bandCount(height)));
+  std::vector<size_t> fine_pixels(bands.size(), 0);
+  forEachBand(height, [&](int band, int first, int end) {
+    const auto b = static_cast<size_t>(band);
+    SplatBand& splats = bands[b].emplace(response, width, height, first, end);
+    FineSampler sampler(rays, prototype, !adaptive);
+    FinePixel fine;
+    for (int j = first; j < end; ++j) {
+      for (int i = 0; i < width; ++i) {
+        const size_t pixel = static_cast<size_t>(j) * w + static_cast<size_t>(i);
+        if (!needsFineLook(pixels, width, height, i, j)) {
+          constants[pixel] = pixels.radiance[pixel];
+          continue;
+        }
+        // Anything thin has two borders.
+        const bool may_stop = adaptive && mask.curves(pixel) < 2;
+        sampler.look(i, j, hashCounters({key, pixel}), may_stop, &fine);
+        constants[pixel] = fine.constant;
+        splats.add(i, j, fine);
+        ++fine_pixels[b];
       }
     }
-    std::swap(above, below);
-  }
+  });
+  for (const size_t count : fine_pixels) rendering.fine_pixels += count;
+
+  rendering.radiance = std::move(pixels.radiance);
+  response.convolve(width, height, constants, &rendering.radiance);
+  forEachBand(height, [&](int band, int first, int end) {
+    for (int j = first; j < end; ++j) {
+      float* out = rendering.radiance.data() + static_cast<size_t>(j) * w;
+      // Always in this order, as floats want.
+      for (const int from : {band, band - 1, band + 1}) {
+        if (from < 0 || from >= static_cast<int>(bands.size())) continue;
+        const float* light = bands[static_cast<size_t>(from)]->row(j);
+        if (light == nullptr) continue;
+        for (size_t i = 0; i < w; ++i) out[i] += light[i];
+      }
+    }
+  });
+  response.blurRest(width, height, &rendering.radiance);
   return rendering;
 }
 

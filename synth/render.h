@@ -7,6 +7,7 @@
 
 #include "cameras/camera.h"
 #include "synth/labels.h"
+#include "synth/pixel_response.h"
 #include "synth/raycaster.h"
 #include "synth/scene.h"
 #include "synth/shading.h"
@@ -38,6 +39,22 @@ class CameraRays {
     return exact_[static_cast<size_t>(j) * static_cast<size_t>(width()) + static_cast<size_t>(i)] !=
            0;
   }
+  /// How many of the pixel's four corners have a ray.
+  [[nodiscard]] int validCorners(int i, int j) const {
+    return (cornerValid(i, j) ? 1 : 0) + (cornerValid(i + 1, j) ? 1 : 0) +
+           (cornerValid(i, j + 1) ? 1 : 0) + (cornerValid(i + 1, j + 1) ? 1 : 0);
+  }
+  /// Of a pixel with four valid corners; nearly of unit length.
+  [[nodiscard]] Eigen::Vector3f centreRay(int i, int j) const;
+
+  /// Squares of kBlock pixels: which of their pixels' corners have a ray.
+  static constexpr int kBlock = 4;
+  enum class Block : uint8_t { kInvalid, kPartlyValid, kValid };
+  /// The block that holds pixel (i, j).
+  [[nodiscard]] Block block(int i, int j) const {
+    return blocks_[static_cast<size_t>(j / kBlock * block_columns_ + i / kBlock)];
+  }
+
   /// Pixels that are exact, for statistics.
   [[nodiscard]] size_t exactCount() const;
 
@@ -49,26 +66,40 @@ class CameraRays {
   Camera camera_;
   std::vector<float> x_, y_, z_;
   std::vector<uint8_t> valid_, exact_;
+  int block_columns_ = 0;
+  std::vector<Block> blocks_;
 };
 
 /// How finely a pixel is looked at.
 enum class Sampling {
-  kAdaptive,    ///< Corners where a pixel shows one surface, kFineSamples elsewhere.
-  kEverywhere,  ///< kFineSamples in every pixel: the reference.
+  kAdaptive,    ///< kFineSamples where they make a difference.
+  kEverywhere,  ///< kFineSamples in every pixel, all of them shaded: the reference.
 };
 
 inline constexpr int kFineSamples = 64;
 
 struct Rendering {
-  std::vector<float> radiance;  ///< width * height, row-major: mean over the pixel's square.
-  size_t fine_pixels = 0;       ///< Pixels with kFineSamples.
+  std::vector<float> radiance;  ///< width * height, row-major: what the pixels answer.
+  size_t fine_pixels = 0;       ///< Pixels that got more than one sample.
 };
 
-/// Box-filtered radiance. A pixel whose four corners see one surface, and through which no span's
-/// curve passes, gets the mean of its corners; all others kFineSamples samples in a rank-1 lattice,
-/// shifted by a hash of (key, pixel); the first four of each flat surface are shaded. So no visible
-/// edge or thin rod is missed, and curved outlines are found by the corners. Samples without a ray
-/// are left out of the mean; a pixel without any is 0.
+/// Radiance as pixels of the given response see it; black where there is no ray, and continued by
+/// the border pixels beyond the image.
+///
+/// Where surfaces may meet is known before a ray is cast: along the curves of the spans, and the
+/// outlines of spheres, discs and elliptic decals. These pixels, the rim of the camera's domain,
+/// and pixels that differ from a neighbour (where round things enter others) get kFineSamples
+/// samples in a rank-1 lattice, mirrored and shifted by a hash of (key, pixel); a fourth of them if
+/// at most one curve passes and the step between the surfaces is at most 2 grey levels. So neither
+/// edges nor rods of any thinness are missed. Flat surfaces are shaded once a pixel, in the middle
+/// of their samples. Samples reach neighbouring pixels with the response's weight at their very
+/// positions.
+///
+/// All other pixels are constant. Blocks of 4 x 4 of them whose corners show one surface in nearly
+/// the same light are interpolated from the corners, others (all, where lights cast shadows) have
+/// one sample in the centre.
+///
+/// Uses the threads of the caller's task arena; the result does not depend on their number.
 [[nodiscard]] Rendering renderRadiance(const Scene& scene,
                                        const Raycaster& raycaster,
                                        const Shader& shader,
@@ -76,6 +107,7 @@ struct Rendering {
                                        const Pose& pose,
                                        const std::vector<EdgeSpan>& spans,
                                        uint64_t key,
+                                       const PixelResponse& response = PixelResponse(),
                                        Sampling sampling = Sampling::kAdaptive);
 
 }  // namespace dlsd

@@ -92,12 +92,15 @@ struct Edge {
   int carrier = 0;             ///< Edges on one infinite line share it.
 };
 
-/// Lambert light without shadows.
+/// A light for Lambert surfaces.
 struct Light {
   enum class Kind { kSun, kPoint } kind = Kind::kSun;
   Eigen::Vector3d place{0, 0, 1};  ///< kSun: unit direction to the light. kPoint: position.
   double strength = 0;             ///< Irradiance / pi at normal incidence; kPoint: at no distance.
   double half_distance = 1;        ///< kPoint: strength / (1 + (d / half_distance)^2).
+  /// Whether faces that look at the light (not their backs: a sun shines into a room from outside),
+  /// spheres and discs keep it from what is behind them. At most 7 lights of a scene.
+  bool casts_shadows = false;
 };
 
 /// A convex piece of a solid, for checks that solids do not enter each other.

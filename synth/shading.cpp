@@ -1,28 +1,66 @@
 #include "synth/shading.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <limits>
+#include <stdexcept>
+#include <string>
 
 namespace dlsd {
 
-double irradiance(const Scene& scene, const Eigen::Vector3d& point, const Eigen::Vector3d& normal) {
+namespace {
+
+double ambientIrradiance(const Scene& scene, const Eigen::Vector3d& normal) {
   const double up = (1 + normal.z()) / 2;
-  double sum = up * scene.ambient_up + (1 - up) * scene.ambient_down;
-  for (const Light& light : scene.lights) {
-    if (light.kind == Light::Kind::kSun) {
-      sum += light.strength * std::max(0.0, normal.dot(light.place));
-    } else {
-      const Eigen::Vector3d to_light = light.place - point;
-      const double d2 = to_light.squaredNorm();
-      const double cosine = normal.dot(to_light) / std::sqrt(d2 + 1e-12);
-      sum += light.strength * std::max(0.0, cosine) /
-             (1 + d2 / (light.half_distance * light.half_distance));
-    }
+  return up * scene.ambient_up + (1 - up) * scene.ambient_down;
+}
+
+double lightIrradiance(const Light& light,
+                       const Eigen::Vector3d& point,
+                       const Eigen::Vector3d& normal) {
+  if (light.kind == Light::Kind::kSun) {
+    return light.strength * std::max(0.0, normal.dot(light.place));
   }
+  const Eigen::Vector3d to_light = light.place - point;
+  const double d2 = to_light.squaredNorm();
+  const double cosine = normal.dot(to_light) / std::sqrt(d2 + 1e-12);
+  return light.strength * std::max(0.0, cosine) /
+         (1 + d2 / (light.half_distance * light.half_distance));
+}
+
+}  // namespace
+
+double irradiance(const Scene& scene, const Eigen::Vector3d& point, const Eigen::Vector3d& normal) {
+  double sum = ambientIrradiance(scene, normal);
+  for (const Light& light : scene.lights) sum += lightIrradiance(light, point, normal);
   return sum;
 }
 
-Shader::Shader(const Scene& scene) : scene_(&scene), grids_(scene.faces.size()) {
+Shader::Shader(const Scene& scene, const Raycaster* raycaster)
+    : scene_(&scene), raycaster_(raycaster), grids_(scene.faces.size()) {
+  for (const Light& light : scene.lights) {
+    if (light.casts_shadows && raycaster != nullptr) {
+      shadow_lights_.push_back(light);
+    } else {
+      (light.kind == Light::Kind::kSun ? plain_suns_ : point_lights_).push_back(light);
+    }
+  }
+  if (shadow_lights_.size() > 7) {
+    throw std::invalid_argument(
+        "lights that cast shadows = " + std::to_string(shadow_lights_.size()) +
+        " is out of range: allowed is [0, 7]");
+  }
+  if (scene.surfaces.size() >= 1U << kSurfaceBits) {
+    throw std::invalid_argument("a scene has more surfaces than 2^24");
+  }
+  faces_.reserve(scene.faces.size());
+  for (const Face& face : scene.faces) {
+    double distant = ambientIrradiance(scene, face.normal);
+    for (const Light& sun : plain_suns_) distant += lightIrradiance(sun, face.origin, face.normal);
+    faces_.push_back(
+        {face.normal, face.normal.dot(face.origin), distant, face.surface, !face.decals.empty()});
+  }
   for (size_t f = 0; f < scene.faces.size(); ++f) {
     const std::vector<Decal>& decals = scene.faces[f].decals;
     if (decals.empty()) continue;
@@ -63,7 +101,6 @@ Shader::Shader(const Scene& scene) : scene_(&scene), grids_(scene.faces.size()) 
 
 int Shader::surfaceOfFace(int face, const Eigen::Vector3d& point) const {
   const Face& f = scene_->faces[static_cast<size_t>(face)];
-  if (f.decals.empty()) return f.surface;
   const Eigen::Vector3d d = point - f.origin;
   const Eigen::Vector2d p(f.e1.dot(d), f.e2.dot(d));
   const DecalGrid& grid = grids_[static_cast<size_t>(face)];
@@ -83,51 +120,156 @@ int Shader::surfaceOfFace(int face, const Eigen::Vector3d& point) const {
 Eigen::Vector3d Shader::pointOnFace(const Hit& hit,
                                     const Eigen::Vector3d& origin,
                                     const Eigen::Vector3d& direction) const {
-  const Face& face = scene_->faces[static_cast<size_t>(hit.index)];
+  const FaceLook& face = faces_[static_cast<size_t>(hit.index)];
   // Seen at 1e-9 rad or less to the plane, the caster's distance is as good as any.
   const double cosine = face.normal.dot(direction);
-  const double t = std::abs(cosine) > 1e-9 ? face.normal.dot(face.origin - origin) / cosine
+  const double t = std::abs(cosine) > 1e-9 ? (face.offset - face.normal.dot(origin)) / cosine
                                            : static_cast<double>(hit.distance);
   return origin + t * direction;
 }
 
-int Shader::surfaceAt(const Hit& hit,
-                      const Eigen::Vector3d& origin,
-                      const Eigen::Vector3d& direction) const {
+int Shader::surfaceOfRound(const Hit& hit) const {
   const auto index = static_cast<size_t>(hit.index);
-  switch (hit.kind) {
-    case HitKind::kNothing:
-      return -1;
-    case HitKind::kFace:
-      if (scene_->faces[index].decals.empty()) return scene_->faces[index].surface;
-      return surfaceOfFace(hit.index, pointOnFace(hit, origin, direction));
-    case HitKind::kSphere:
-      return scene_->spheres[index].surface;
-    case HitKind::kDisc:
-      return scene_->discs[index].surface;
+  return hit.kind == HitKind::kSphere ? scene_->spheres[index].surface
+                                      : scene_->discs[index].surface;
+}
+
+Shader::Place Shader::placeOf(const Hit& hit,
+                              const Eigen::Vector3d& origin,
+                              const Eigen::Vector3d& direction) const {
+  const auto index = static_cast<size_t>(hit.index);
+  if (hit.kind == HitKind::kFace) {
+    return {pointOnFace(hit, origin, direction), faces_[index].normal};
   }
-  return -1;
+  const Eigen::Vector3d point = origin + static_cast<double>(hit.distance) * direction;
+  if (hit.kind == HitKind::kSphere) {
+    return {point, (point - scene_->spheres[index].centre.cast<double>()).normalized()};
+  }
+  const Eigen::Vector3d normal = scene_->discs[index].normal.cast<double>();
+  const Eigen::Vector3d centre = scene_->discs[index].centre.cast<double>();
+  const double cosine = normal.dot(direction);
+  return {cosine != 0 ? Eigen::Vector3d(origin + normal.dot(centre - origin) / cosine * direction)
+                      : point,
+          cosine > 0 ? Eigen::Vector3d(-normal) : normal};
+}
+
+void Shader::castShadow(
+    const Light& light, Sight bit, const Place* places, size_t count, Sight* sights) const {
+  // From the light to the place, so that a place never hides itself.
+  RayPacket packet{};
+  std::array<size_t, RayPacket::kSize> slots{};
+  size_t rays = 0;
+  for (size_t i = 0; i < count; ++i) {
+    if (sights[i] < 0) continue;
+    constexpr double kSunDistance = 64;  // m; scenes are smaller.
+    const bool sun = light.kind == Light::Kind::kSun;
+    const Eigen::Vector3d from =
+        sun ? Eigen::Vector3d(places[i].point + kSunDistance * light.place) : light.place;
+    const Eigen::Vector3f start = from.cast<float>();
+    const Eigen::Vector3d way = places[i].point - start.cast<double>();
+    const double distance = way.norm(), cosine = -places[i].normal.dot(way) / distance;
+    if (!(cosine > 1e-4)) continue;  // It gets no light from there anyway.
+    // The caster's float rounding, which counts the more the flatter the light falls.
+    const double margin = 1e-5 + 1e-6 * distance / cosine;
+    if (!(distance > margin)) continue;
+    packet.origin_x[rays] = start.x();
+    packet.origin_y[rays] = start.y();
+    packet.origin_z[rays] = start.z();
+    packet.direction_x[rays] = static_cast<float>(way.x() / distance);
+    packet.direction_y[rays] = static_cast<float>(way.y() / distance);
+    packet.direction_z[rays] = static_cast<float>(way.z() / distance);
+    packet.min_distance[rays] = 0;
+    packet.max_distance[rays] = static_cast<float>(distance - margin);
+    slots[rays++] = i;
+  }
+  while (rays > 0) {
+    std::array<Hit, RayPacket::kSize> hits;
+    raycaster_->castPacket(packet, rays, hits.data());
+    // Faces met from behind let the light through: those rays go on.
+    size_t left = 0;
+    for (size_t k = 0; k < rays; ++k) {
+      if (hits[k].kind == HitKind::kNothing) continue;
+      const bool from_behind =
+          hits[k].kind == HitKind::kFace &&
+          faces_[static_cast<size_t>(hits[k].index)].normal.dot(
+              Eigen::Vector3f(packet.direction_x[k], packet.direction_y[k], packet.direction_z[k])
+                  .cast<double>()) > 0;
+      if (!from_behind) {
+        sights[slots[k]] |= bit;
+        continue;
+      }
+      const float next =
+          std::nextafter(hits[k].distance * (1 + 1e-6F), std::numeric_limits<float>::infinity());
+      if (!(next < packet.max_distance[k])) continue;
+      for (auto* values : {&packet.origin_x,
+                           &packet.origin_y,
+                           &packet.origin_z,
+                           &packet.direction_x,
+                           &packet.direction_y,
+                           &packet.direction_z,
+                           &packet.max_distance}) {
+        (*values)[left] = (*values)[k];
+      }
+      packet.min_distance[left] = next;
+      slots[left++] = slots[k];
+    }
+    rays = left;
+  }
+}
+
+void Shader::addShadows(const Hit* hits,
+                        const Eigen::Vector3d& origin,
+                        const float* x,
+                        const float* y,
+                        const float* z,
+                        size_t count,
+                        Sight* sights) const {
+  std::array<Place, RayPacket::kSize> places;
+  for (size_t i = 0; i < count; ++i) {
+    if (sights[i] < 0) continue;
+    places[i] = placeOf(hits[i], origin, Eigen::Vector3f(x[i], y[i], z[i]).cast<double>());
+  }
+  for (size_t k = 0; k < shadow_lights_.size(); ++k) {
+    castShadow(
+        shadow_lights_[k], 1 << (kSurfaceBits + static_cast<int>(k)), places.data(), count, sights);
+  }
 }
 
 float Shader::radiance(const Hit& hit,
                        const Eigen::Vector3d& origin,
                        const Eigen::Vector3d& direction,
-                       int surface) const {
-  if (surface < 0) return 0;
-  const auto index = static_cast<size_t>(hit.index);
-  Eigen::Vector3d point = origin + static_cast<double>(hit.distance) * direction;
-  Eigen::Vector3d normal;
-  if (hit.kind == HitKind::kFace) {
-    point = pointOnFace(hit, origin, direction);
-    normal = scene_->faces[index].normal;
-  } else if (hit.kind == HitKind::kSphere) {
-    normal = (point - scene_->spheres[index].centre.cast<double>()).normalized();
-  } else {
-    normal = scene_->discs[index].normal.cast<double>();
-    if (normal.dot(direction) > 0) normal = -normal;
+                       Sight sight) const {
+  if (sight < 0) return 0;
+  const Surface& s = scene_->surfaces[static_cast<size_t>(sight & ((1 << kSurfaceBits) - 1))];
+  const bool is_face = hit.kind == HitKind::kFace;
+  double sum = is_face ? faces_[static_cast<size_t>(hit.index)].irradiance : 0;
+  if (!is_face || !point_lights_.empty() || !shadow_lights_.empty()) {
+    const Place place = placeOf(hit, origin, direction);
+    if (!is_face) {
+      sum = ambientIrradiance(*scene_, place.normal);
+      for (const Light& sun : plain_suns_) sum += lightIrradiance(sun, place.point, place.normal);
+    }
+    for (const Light& light : point_lights_) {
+      sum += lightIrradiance(light, place.point, place.normal);
+    }
+    for (size_t k = 0; k < shadow_lights_.size(); ++k) {
+      if ((sight >> (kSurfaceBits + static_cast<int>(k)) & 1) != 0) continue;
+      sum += lightIrradiance(shadow_lights_[k], place.point, place.normal);
+    }
   }
-  const Surface& s = scene_->surfaces[static_cast<size_t>(surface)];
-  return static_cast<float>(s.albedo * irradiance(*scene_, point, normal) + s.emission);
+  return static_cast<float>(s.albedo * sum + s.emission);
+}
+
+Seen Shader::shade(const Hit& hit,
+                   const Eigen::Vector3d& origin,
+                   const Eigen::Vector3d& direction) const {
+  const int surface = surfaceAt(hit, origin, direction);
+  Sight sight = surface;
+  if (hasShadows()) {
+    const Eigen::Vector3f d = direction.cast<float>();
+    addShadows(&hit, origin, &d.x(), &d.y(), &d.z(), 1, &sight);
+  }
+  return {surface, radiance(hit, origin, direction, sight)};
 }
 
 }  // namespace dlsd

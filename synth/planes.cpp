@@ -1,0 +1,380 @@
+#include "synth/planes.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <numeric>
+
+#include "cameras/batch.h"
+#include "synth/parallel.h"
+
+namespace dlsd {
+namespace {
+
+constexpr std::array<std::pair<PlaneKind, std::string_view>, 5> kNames{
+    {{PlaneKind::kDepth, "depth"},
+     {PlaneKind::kNormal, "normal"},
+     {PlaneKind::kInstance, "instance"},
+     {PlaneKind::kEdge, "edge"},
+     {PlaneKind::kDistanceField, "df"}}};
+
+/// Body of each face, by connected components of faces that share vertices or edges, numbered in
+/// the order of their first faces.
+struct Bodies {
+  explicit Bodies(const Scene& scene) : of_face(scene.faces.size()) {
+    std::vector<int> parent(scene.faces.size());
+    std::iota(parent.begin(), parent.end(), 0);
+    const auto root = [&](int face) {
+      auto f = static_cast<size_t>(face);
+      while (parent[f] != static_cast<int>(f)) {
+        parent[f] = parent[static_cast<size_t>(parent[f])];
+        f = static_cast<size_t>(parent[f]);
+      }
+      return static_cast<int>(f);
+    };
+    const auto join = [&](int face, int other) {
+      const int a = root(face), b = root(other);
+      parent[static_cast<size_t>(std::max(a, b))] = std::min(a, b);
+    };
+    std::vector<int> face_at(scene.vertices.size(), -1);
+    for (const Triangle& triangle : scene.triangles) {
+      for (const int v : triangle.vertices) {
+        int& other = face_at[static_cast<size_t>(v)];
+        if (other < 0) other = triangle.face;
+        join(other, triangle.face);
+      }
+    }
+    for (const Edge& edge : scene.edges) {
+      if (edge.source == EdgeSource::kFaces) join(edge.face0, edge.face1);
+    }
+    for (size_t f = 0; f < of_face.size(); ++f) {
+      const int r = root(static_cast<int>(f));
+      of_face[f] = r == static_cast<int>(f) ? count++ : of_face[static_cast<size_t>(r)];
+    }
+  }
+
+  std::vector<int> of_face;
+  int count = 0;
+};
+
+/// What the rays through the pixels' centres meet.
+class Centres {
+ public:
+  Centres(const Scene& scene, const Raycaster& raycaster, const Camera& camera, const Pose& pose)
+      : scene_(scene), raycaster_(raycaster), camera_(camera), pose_(pose), bodies_(scene) {}
+
+  struct Seen {
+    double depth = 0;
+    Eigen::Vector3d normal_in_cam{0, 0, 0};
+    int body = -1;
+  };
+
+  /// Calls function(pixel, seen) for all pixels.
+  template <class Function>
+  void forEach(const Function& function) const {
+    const auto w = static_cast<size_t>(camera_.width());
+    const Eigen::Matrix3d world_from_cam = pose_.cam_from_world.transpose();
+    const Eigen::Vector3f origin = pose_.position_in_world.cast<float>();
+    forEachBand(camera_.height(), [&](int /*band*/, int first, int end) {
+      std::vector<double> u(w), v(w), x(w), y(w), z(w);
+      std::vector<uint8_t> valid(w);
+      std::array<float, Raycaster::kPacket> dx, dy, dz;
+      std::array<Eigen::Vector3d, Raycaster::kPacket> rays;
+      std::array<size_t, Raycaster::kPacket> slots{};
+      std::array<Hit, Raycaster::kPacket> hits;
+      for (int j = first; j < end; ++j) {
+        for (size_t i = 0; i < w; ++i) {
+          u[i] = static_cast<double>(i);
+          v[i] = j;
+        }
+        unprojectAll(camera_, u, v, x, y, z, valid);
+        size_t count = 0;
+        for (size_t i = 0; i < w; ++i) {
+          const size_t pixel = static_cast<size_t>(j) * w + i;
+          if (valid[i] != 0) {
+            rays[count] = world_from_cam * Eigen::Vector3d(x[i], y[i], z[i]);
+            dx[count] = static_cast<float>(rays[count].x());
+            dy[count] = static_cast<float>(rays[count].y());
+            dz[count] = static_cast<float>(rays[count].z());
+            slots[count++] = pixel;
+          } else {
+            function(pixel, Seen());
+          }
+          if (count < Raycaster::kPacket && i + 1 < w) continue;
+          raycaster_.castPacket(origin, dx.data(), dy.data(), dz.data(), count, hits.data());
+          for (size_t k = 0; k < count; ++k) function(slots[k], see(hits[k], rays[k]));
+          count = 0;
+        }
+      }
+    });
+  }
+
+ private:
+  [[nodiscard]] Seen see(const Hit& hit, const Eigen::Vector3d& ray) const {
+    Seen seen;
+    const auto index = static_cast<size_t>(hit.index);
+    const Eigen::Vector3d& origin = pose_.position_in_world;
+    seen.depth = static_cast<double>(hit.distance);
+    Eigen::Vector3d normal(0, 0, 0);
+    switch (hit.kind) {
+      case HitKind::kNothing:
+        return Seen();
+      case HitKind::kFace: {
+        const Face& face = scene_.faces[index];
+        normal = face.normal;
+        const double cosine = normal.dot(ray);
+        // The plane is more exact than the caster's float, unless seen along itself.
+        if (std::abs(cosine) > 1e-6) seen.depth = normal.dot(face.origin - origin) / cosine;
+        seen.body = bodies_.of_face[index];
+        break;
+      }
+      case HitKind::kSphere:
+        normal =
+            (origin + seen.depth * ray - scene_.spheres[index].centre.cast<double>()).normalized();
+        seen.body = bodies_.count + hit.index;
+        break;
+      case HitKind::kDisc:
+        normal = scene_.discs[index].normal.cast<double>().normalized();
+        seen.body = bodies_.count + static_cast<int>(scene_.spheres.size()) + hit.index;
+        break;
+    }
+    if (normal.dot(ray) > 0) normal = -normal;
+    seen.normal_in_cam = pose_.cam_from_world * normal;
+    return seen;
+  }
+
+  const Scene& scene_;
+  const Raycaster& raycaster_;
+  const Camera& camera_;
+  const Pose& pose_;
+  Bodies bodies_;
+};
+
+/// A straight piece of a label's curve.
+struct Piece {
+  Eigen::Vector2d from, along;  ///< along: to the other end.
+  double length2;
+  int label;
+
+  [[nodiscard]] Eigen::Vector2d nearest(const Eigen::Vector2d& p) const {
+    const double t = length2 > 0 ? std::clamp((p - from).dot(along) / length2, 0.0, 1.0) : 0.0;
+    return from + t * along;
+  }
+};
+
+struct Nearest {
+  Eigen::Vector2d point;
+  const Piece* piece;
+  double distance;
+};
+
+/// Finds the nearest piece for every pixel by halving the image: in a square of half diagonal r
+/// whose centre has the nearest piece at distance d, only pieces within d + 2 r of the centre can
+/// be the nearest of any of its points.
+class NearestPieces {
+ public:
+  NearestPieces(int width, int height, const std::vector<LabelLine>& lines)
+      : width_(width), height_(height) {
+    for (const LabelLine& line : lines) {
+      for (size_t i = 1; i < line.points.size(); ++i) {
+        const Eigen::Vector2d d = line.points[i] - line.points[i - 1];
+        pieces_.push_back({line.points[i - 1], d, d.squaredNorm(), line.id});
+      }
+    }
+  }
+
+  /// Calls function(pixel, nearest) for all pixels; not at all if there are no pieces.
+  template <class Function>
+  void forEach(const Function& function) const {
+    if (pieces_.empty()) return;
+    std::vector<int> all(pieces_.size());
+    std::iota(all.begin(), all.end(), 0);
+    const int columns = (width_ + kBandRows - 1) / kBandRows;
+    forEachBand(height_, [&](int /*band*/, int first, int /*end*/) {
+      // What the whole band may need, then its squares.
+      const std::vector<int> of_band = candidates(
+          all, {(width_ - 1) / 2.0, first + (kBandRows - 1) / 2.0}, width_ - 1, kBandRows - 1);
+      for (int c = 0; c < columns; ++c) split(of_band, c * kBandRows, first, kBandRows, function);
+    });
+  }
+
+ private:
+  static constexpr int kLeaf = 8;
+
+  [[nodiscard]] std::vector<int> candidates(const std::vector<int>& from,
+                                            const Eigen::Vector2d& centre,
+                                            double width,
+                                            double height) const {
+    std::vector<double> distances;
+    distances.reserve(from.size());
+    for (const int k : from) {
+      distances.push_back((pieces_[static_cast<size_t>(k)].nearest(centre) - centre).norm());
+    }
+    const double limit =
+        *std::min_element(distances.begin(), distances.end()) + std::hypot(width, height) + 1e-9;
+    std::vector<int> kept;
+    for (size_t i = 0; i < from.size(); ++i) {
+      if (distances[i] <= limit) kept.push_back(from[i]);
+    }
+    return kept;
+  }
+
+  template <class Function>
+  void split(
+      const std::vector<int>& from, int x0, int y0, int side, const Function& function) const {
+    if (x0 >= width_ || y0 >= height_) return;
+    const double half = (side - 1) / 2.0;
+    const std::vector<int> kept = candidates(from, {x0 + half, y0 + half}, side - 1, side - 1);
+    if (side > kLeaf) {
+      const int next = side / 2;
+      for (const int dy : {0, next}) {
+        for (const int dx : {0, next}) split(kept, x0 + dx, y0 + dy, next, function);
+      }
+      return;
+    }
+    for (int y = y0; y < std::min(height_, y0 + side); ++y) {
+      for (int x = x0; x < std::min(width_, x0 + side); ++x) {
+        const Eigen::Vector2d p(x, y);
+        // The first of equally near ones, so that the order of labels decides.
+        Nearest best{{0, 0}, nullptr, std::numeric_limits<double>::infinity()};
+        for (const int k : kept) {
+          const Piece& piece = pieces_[static_cast<size_t>(k)];
+          const Eigen::Vector2d q = piece.nearest(p);
+          const double distance = (q - p).norm();
+          if (distance < best.distance) best = {q, &piece, distance};
+        }
+        function(static_cast<size_t>(y) * static_cast<size_t>(width_) + static_cast<size_t>(x),
+                 best);
+      }
+    }
+  }
+
+  int width_, height_;
+  std::vector<Piece> pieces_;
+};
+
+/// Angle from x towards y, in [0, pi).
+float directionAngle(const Eigen::Vector2d& along) {
+  double angle = std::atan2(along.y(), along.x());
+  if (angle < 0) angle += M_PI;
+  const auto rounded = static_cast<float>(angle);
+  return rounded < static_cast<float>(M_PI) ? rounded : 0.0F;
+}
+
+}  // namespace
+
+std::string_view toString(PlaneKind kind) {
+  for (const auto& [value, name] : kNames) {
+    if (value == kind) return name;
+  }
+  return "";
+}
+
+std::optional<PlaneKind> planeFromName(std::string_view wanted) {
+  for (const auto& [value, name] : kNames) {
+    if (name == wanted) return value;
+  }
+  return std::nullopt;
+}
+
+const std::vector<std::string>& planeNames() {
+  static const std::vector<std::string> names = [] {
+    std::vector<std::string> all;
+    for (const auto& [value, name] : kNames) all.emplace_back(name);
+    return all;
+  }();
+  return names;
+}
+
+std::vector<Plane> renderPlanes(const Scene& scene,
+                                const Raycaster& raycaster,
+                                const Camera& camera,
+                                const Pose& pose,
+                                const std::vector<LabelLine>& lines,
+                                const std::vector<PlaneKind>& kinds) {
+  const size_t pixels = static_cast<size_t>(camera.width()) * static_cast<size_t>(camera.height());
+  std::vector<Plane> planes;
+  // Where each kind goes, or nullptr.
+  std::vector<float>*depth = nullptr, *normal = nullptr, *field = nullptr;
+  std::vector<int32_t>*instance = nullptr, *edge = nullptr;
+  planes.reserve(kinds.size());
+  for (const PlaneKind kind : kinds) {
+    Plane& plane = planes.emplace_back(Plane{kind, camera.width(), camera.height(), 1, {}});
+    switch (kind) {
+      case PlaneKind::kDepth:
+        depth = &plane.values.emplace<std::vector<float>>(pixels, 0.0F);
+        break;
+      case PlaneKind::kNormal:
+        plane.channels = 3;
+        normal = &plane.values.emplace<std::vector<float>>(3 * pixels, 0.0F);
+        break;
+      case PlaneKind::kInstance:
+        instance = &plane.values.emplace<std::vector<int32_t>>(pixels, -1);
+        break;
+      case PlaneKind::kEdge:
+        edge = &plane.values.emplace<std::vector<int32_t>>(pixels, -1);
+        break;
+      case PlaneKind::kDistanceField:
+        plane.channels = 4;
+        field = &plane.values.emplace<std::vector<float>>(4 * pixels, 0.0F);
+        for (size_t i = 0; i < pixels; ++i) (*field)[4 * i] = -1;
+        break;
+    }
+  }
+  if (depth != nullptr || normal != nullptr || instance != nullptr) {
+    Centres(scene, raycaster, camera, pose).forEach([&](size_t pixel, const Centres::Seen& seen) {
+      if (depth != nullptr) (*depth)[pixel] = static_cast<float>(seen.depth);
+      if (instance != nullptr) (*instance)[pixel] = seen.body;
+      if (normal == nullptr) return;
+      for (size_t k = 0; k < 3; ++k) {
+        (*normal)[3 * pixel + k] = static_cast<float>(seen.normal_in_cam[static_cast<int>(k)]);
+      }
+    });
+  }
+  if (edge != nullptr || field != nullptr) {
+    NearestPieces(camera.width(), camera.height(), lines)
+        .forEach([&](size_t pixel, const Nearest& nearest) {
+          if (edge != nullptr && nearest.distance <= kEdgePlanePx) {
+            (*edge)[pixel] = nearest.piece->label;
+          }
+          if (field == nullptr) return;
+          float* out = field->data() + 4 * pixel;
+          out[0] = static_cast<float>(nearest.distance);
+          out[1] = directionAngle(nearest.piece->along);
+          out[2] = static_cast<float>(nearest.point.x());
+          out[3] = static_cast<float>(nearest.point.y());
+        });
+  }
+  return planes;
+}
+
+std::string encodeNpy(const Plane& plane) {
+  static_assert(std::endian::native == std::endian::little, "values are written as they are");
+  const bool is_float = std::holds_alternative<std::vector<float>>(plane.values);
+  std::string header = std::string("{'descr': '") + (is_float ? "<f4" : "<i4") +
+                       "', 'fortran_order': False, 'shape': (" + std::to_string(plane.height) +
+                       ", " + std::to_string(plane.width);
+  if (plane.channels > 1) header += ", " + std::to_string(plane.channels);
+  header += "), }";
+  // Magic, version and length take 10 bytes; the values start at a multiple of 64.
+  header.append(63 - (10 + header.size()) % 64, ' ');
+  header += '\n';
+  std::string bytes("\x93NUMPY\x01\x00", 8);
+  bytes += static_cast<char>(header.size() % 256);
+  bytes += static_cast<char>(header.size() / 256);
+  bytes += header;
+  std::visit(
+      [&](const auto& values) {
+        const size_t start = bytes.size(), size = values.size() * sizeof(values[0]);
+        bytes.resize(start + size);
+        std::memcpy(bytes.data() + start, values.data(), size);
+      },
+      plane.values);
+  return bytes;
+}
+
+}  // namespace dlsd
