@@ -226,6 +226,16 @@ Point3 referenceUnproject(const ThetaPolynomial& m, double u, double v) {
   return {mx * s, my * s, std::cos(theta)};
 }
 
+Point2 referenceProject(const Equirectangular& m, double x, double y, double z) {
+  return {m.fx * std::atan2(x, z) + m.cx, m.fy * std::atan2(y, std::sqrt(x * x + z * z)) + m.cy};
+}
+Point3 referenceUnproject(const Equirectangular& m, double u, double v) {
+  const double longitude = (u - m.cx) / m.fx, latitude = (v - m.cy) / m.fy;
+  return {std::cos(latitude) * std::sin(longitude),
+          std::sin(latitude),
+          std::cos(latitude) * std::cos(longitude)};
+}
+
 // --- Cameras of about 1280 x 1024, each near one that exists ---
 
 Camera exampleCamera(std::string_view model) {
@@ -247,6 +257,7 @@ Camera exampleCamera(std::string_view model) {
       {"theta_polynomial", {339.749, -31.988, 48.275, -7.201, 1, 643.4, 515.8}},
       // TUM-VI, 2.5 times as large.
       {"double_sphere", {-0.17213, 0.59302, 395.7, 395.7, 637.8, 512.4}},
+      {"equirectangular", {1280 / (2 * M_PI), 1024 / M_PI, 639.5, 511.5}},
   };
   return makeCamera(model, params.at(model), kWidth, kHeight);
 }

@@ -76,14 +76,33 @@ DLSD_BATCH_TARGET void projectBlock(const M& model,
                                     size_t n) {
   const M m = model;  // A copy that no store through a pointer can change.
   Flag<T> flag[kBlock];
-  DLSD_BATCH_LOOP
-  for (size_t i = 0; i < n; ++i) {
-    const Pixel<T>& p = m.project(x[i], y[i], z[i]);
-    u[i] = p.u;
-    v[i] = p.v;
-    flag[i] = p.valid ? Flag<T>(kValid) : Flag<T>(kInvalid);
+  if constexpr (requires { m.attemptProject(x[0], y[0], z[0]); }) {
+    DLSD_BATCH_LOOP
+    for (size_t i = 0; i < n; ++i) {
+      const Attempt<Pixel<T>>& p = m.attemptProject(x[i], y[i], z[i]);
+      u[i] = p.u;
+      v[i] = p.v;
+      const Flag<T> answer = p.valid ? Flag<T>(kValid) : Flag<T>(kInvalid);
+      flag[i] = p.settled ? answer : Flag<T>(kUnsettled);
+    }
+    for (size_t i = 0; i < n; ++i) valid[i] = static_cast<uint8_t>(flag[i]);
+    for (size_t i = 0; i < n; ++i) {
+      if (valid[i] != kUnsettled) continue;
+      const Pixel<T> p = m.project(x[i], y[i], z[i]);
+      u[i] = p.u;
+      v[i] = p.v;
+      valid[i] = p.valid ? kValid : kInvalid;
+    }
+  } else {
+    DLSD_BATCH_LOOP
+    for (size_t i = 0; i < n; ++i) {
+      const Pixel<T>& p = m.project(x[i], y[i], z[i]);
+      u[i] = p.u;
+      v[i] = p.v;
+      flag[i] = p.valid ? Flag<T>(kValid) : Flag<T>(kInvalid);
+    }
+    for (size_t i = 0; i < n; ++i) valid[i] = static_cast<uint8_t>(flag[i]);
   }
-  for (size_t i = 0; i < n; ++i) valid[i] = static_cast<uint8_t>(flag[i]);
 }
 
 template <class M, class T>

@@ -10,8 +10,9 @@
 //
 // Both are kernels without branches or library calls (fast_math.h) and always inlined, so that one
 // point and a vectorised loop over many (batch.h) run the same operations and give the same bits.
-// A model whose inverse needs an iteration has `attemptUnproject` besides: a fixed number of steps
-// that answers nearly every pixel and says so; unproject takes that or iterates.
+// A model that needs an iteration, or wider numbers somewhere, has `attemptUnproject` (or
+// `attemptProject`) besides: a kernel that answers nearly every point and says so; unproject takes
+// that or goes the long way.
 //
 // Camera frame: x right, y down, z forward. Pixel: integer coordinates are pixel centres.
 // Outside its domain a model answers `valid == false`; the values are then unspecified and must not
@@ -100,7 +101,7 @@ struct FieldAngleLimit {
   }
 };
 
-/// Answer of a kernel of fixed length where only an iteration can answer every case.
+/// Answer of a kernel without branches that cannot answer every case.
 template <class Answer>
 struct Attempt : Answer {
   bool settled;  ///< If not, the answer says nothing.

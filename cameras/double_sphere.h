@@ -77,7 +77,7 @@ struct DoubleSphere {
     const T my = (v - T(cy)) * (T(1) / T(fy));
     const T m2 = mx * mx + my * my;
     // Unit direction at the angle psi, and where it meets the first sphere.
-    const auto [scale, cosine, valid] = second().unproject(m2);
+    const auto& [scale, cosine, valid] = second().unproject(m2);
     const T sine2 = m2 * (scale * scale);
     const T disc = cosine * cosine + T((1 - xi) * (1 + xi)) * sine2;
     const T root = std::sqrt(std::max(disc, T(0)));

@@ -58,7 +58,7 @@ struct Eucm {
     const T my = (v - T(cy)) * (T(1) / T(fy));
     const T m2 = mx * mx + my * my;
     // The point d = 1, then its direction.
-    const auto [scale, z, valid] = sphere().unproject(T(beta) * m2);
+    const auto& [scale, z, valid] = sphere().unproject(T(beta) * m2);
     const T inverse = T(1) / std::sqrt(m2 * (scale * scale) + z * z);
     const T across = scale * inverse;
     return {mx * across, my * across, z * inverse, allOf(valid, pixelInRange(u, v))};

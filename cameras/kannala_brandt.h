@@ -83,24 +83,8 @@ struct KannalaBrandt {
   template <class T>
   [[nodiscard, gnu::always_inline]] Attempt<Ray<T>> attemptUnproject(T u, T v) const {
     const auto& m = radial(u, v);
-    T theta = start.at(m.r_d);
-    T slope, step, curvature;
-    // Each step squares the error: 1e-5, 1e-10, 1e-20 where the fit is good.
-    for (int i = 0; i < (std::is_same_v<T, float> ? 1 : 2); ++i) {
-      const T t = theta * theta;
-      slope = distortSlope(theta);
-      curvature =
-          T(6 * k1) + t * ((T(20 * k2) + t * T(42 * k3)) + (t * t) * T(72 * k4));  // d''/theta
-      // theta - r_d is exact, so the error is that of the distortion alone.
-      step = ((theta - m.r_d) + (theta * t) * distortion(t)) / slope;
-      theta -= step;
-    }
-    // What Newton's step leaves, step^2 d'' / (2 d'), is below the rounding of theta.
-    constexpr T kEpsilon = std::numeric_limits<T>::epsilon();
-    const bool arrived = allOf((step * step) * std::abs(curvature) <= (kEpsilon / 2) * slope,
-                               theta > T(0),
-                               theta < T(max_theta));
-    return {rayAt(m, theta), anyOf(arrived, !m.valid)};
+    const auto& theta = newtonSteps([&](T a) { return mismatch(a, m.r_d); }, start.at(m.r_d));
+    return {rayAt(m, theta.x), anyOf(allOf(theta.arrived, theta.x < T(max_theta)), !m.valid)};
   }
 
   /// theta in [0, max_theta] with d(theta) = r_d, for 0 <= r_d < max_radius.
@@ -109,8 +93,8 @@ struct KannalaBrandt {
     const T hi = T(max_theta);
     return bracketedRoot(
         [&](T theta) -> ValueAndSlope<T> {
-          const T t = theta * theta;
-          return {(theta - r_d) + (theta * t) * distortion(t), distortSlope(theta)};
+          const Jet<T> f = mismatch(theta, r_d);
+          return {f.value, f.slope};
         },
         T(0),
         hi,
@@ -155,6 +139,15 @@ struct KannalaBrandt {
   [[nodiscard]] Ray<T> iterateUnproject(T u, T v) const {
     const Radial<T> m = radial(u, v);
     return rayAt(m, m.valid ? undistort(m.r_d) : T(0));
+  }
+
+  /// d(theta) - r_d. theta - r_d is exact near the zero, so the error is the distortion's alone.
+  template <class T>
+  [[nodiscard, gnu::always_inline]] Jet<T> mismatch(T theta, T r_d) const {
+    const T t = theta * theta;
+    return {(theta - r_d) + (theta * t) * distortion(t),
+            distortSlope(theta),
+            theta * (T(6 * k1) + t * ((T(20 * k2) + t * T(42 * k3)) + (t * t) * T(72 * k4)))};
   }
 
   /// d(theta) = theta + theta t distortion(t), t = theta^2.

@@ -5,6 +5,7 @@
 #include <limits>
 #include <type_traits>
 
+#include "cameras/fast_math.h"
 #include "cameras/polynomial.h"
 
 namespace dlsd {
@@ -40,6 +41,35 @@ template <class T, class Function>
     if (last_step <= std::numeric_limits<T>::epsilon() / 2 * x) break;
   }
   return x;
+}
+
+/// Value, slope and second derivative of a function.
+template <class T>
+struct Jet {
+  T value, slope, curvature;
+};
+
+template <class T>
+struct Arrival {
+  T x;
+  bool arrived;
+};
+
+/// Newton's steps to a zero x > 0 at which the function rises, from a start as good as FittedStart
+/// gives: two, in float one. Has arrived if what the last step leaves of the error,
+/// step^2 |curvature| / (2 slope), is below the rounding of x.
+/// @param function  T -> Jet<T>.
+template <class T, class Function>
+[[nodiscard, gnu::always_inline]] inline Arrival<T> newtonSteps(const Function& function, T start) {
+  T x = start, left = 0, allowed = 0;
+  for (int i = 0; i < (std::is_same_v<T, float> ? 1 : 2); ++i) {
+    const Jet<T> f = function(x);
+    const T step = f.value / f.slope;
+    x -= step;
+    left = (step * step) * std::abs(f.curvature);
+    allowed = std::numeric_limits<T>::epsilon() * x * f.slope;
+  }
+  return {x, allOf(left <= allowed, x > T(0))};
 }
 
 /// Where Newton's method for the inverse y of a rising x(y), y(0) = 0, starts: y / x as a

@@ -20,8 +20,9 @@ namespace dlsd {
 ///
 /// Domain: the field angle atan2(rho, -f(rho)) must rise: rho < max_rho, the first sign change of
 /// rho f'(rho) - f(rho). If there is none the field angle rises to its limit, that of (rho, -f) at
-/// infinity. Solved once in fromParams. The inverse (from ray to rho) is a bracketed Newton
-/// iteration, run to the last bits; the files' fitted inverse polynomial is not used.
+/// infinity. Solved once in fromParams. The inverse (from ray to rho) is two of Newton's steps from
+/// a fitted start, else a bracketed iteration, run to the last bits; the files' fitted inverse
+/// polynomial is not used.
 ///
 /// c, d and e are bounded so that their matrix can always be inverted (determinant >= 0.01).
 struct Ocam {
@@ -49,6 +50,7 @@ struct Ocam {
   double cx = 0, cy = 0, c = 1, d = 0, e = 0;
   double max_rho = kUnbounded;  ///< Derived, px.
   double max_theta = M_PI / 2;  ///< Derived: the field angle there, rad.
+  FittedStart start{};          ///< Derived: of rho over the field angle.
 
   [[nodiscard]] static Ocam fromParams(const std::array<double, 14>& p) {
     Ocam m;
@@ -70,6 +72,11 @@ struct Ocam {
       const bool line = std::all_of(m.a.begin() + 2, m.a.end(), [](double x) { return x == 0; });
       m.max_theta = line ? std::atan2(1.0, -m.a[1]) : M_PI;
     }
+    const double end = std::min(m.max_rho, -kStartShare * m.a[0]);
+    m.start = FittedStart::fit(
+        std::min(m.max_theta, std::atan2(end, m.forward(end).value)),
+        turns.empty() ? kUnbounded : m.max_theta,
+        [&](double theta) { return m.sensorRadius<double>(std::sin(theta), std::cos(theta)).rho; });
     return m;
   }
   [[nodiscard]] std::array<double, 14> params() const {
@@ -79,49 +86,70 @@ struct Ocam {
 
   /// -f(rho), the component of the ray along the optical axis, and its slope.
   template <class T>
-  [[nodiscard]] ValueAndSlope<T> forward(T rho) const {
-    T value = T(-a[8]), slope = T(0);
+  [[nodiscard, gnu::always_inline]] Jet<T> forward(T rho) const {
+    T value = T(-a[8]), slope = T(0), half_curvature = T(0);
     for (size_t i = 8; i-- > 0;) {
+      half_curvature = half_curvature * rho + slope;
       slope = slope * rho + value;
       value = value * rho - T(a[i]);
     }
-    return {value, slope};
+    return {value, slope, T(2) * half_curvature};
   }
 
   template <class T>
-  [[nodiscard]] Pixel<T> project(T x, T y, T z) const {
-    using W = Wider<T>;
-    const W r2 = W(x) * W(x) + W(y) * W(y);
-    const W across = std::sqrt(r2);
-    const T r = static_cast<T>(across);
-    const auto [rho, found] = sensorRadius<T>(across, z);
-    const T scale = r > T(0) ? rho / r : T(-a[0]) / z;
-    const T px = x * scale, py = y * scale;
-    const T u = px + T(e) * py + T(cx);
-    const T v = T(d) * px + T(c) * py + T(cy);
-    return {u, v, found && norm2InRange(static_cast<T>(r2) + z * z) && pixelInRange(u, v)};
+  [[nodiscard, gnu::always_inline]] Pixel<T> project(T x, T y, T z) const {
+    const auto& attempt = attemptProject(x, y, z);
+    return attempt.settled ? static_cast<Pixel<T>>(attempt) : iterateProject(x, y, z);
   }
 
   template <class T>
-  [[nodiscard]] Ray<T> unproject(T u, T v) const {
-    using W = Wider<T>;
-    const W du = static_cast<W>(u) - W(cx), dv = static_cast<W>(v) - W(cy);
-    const W determinant = W(c) - W(d) * W(e);
-    const W px = (W(c) * du - W(e) * dv) / determinant;
-    const W py = (dv - W(d) * du) / determinant;
-    const W rho = std::sqrt(px * px + py * py);
-    const W pz = forward(rho).value;
-    const W scale = 1 / std::sqrt(rho * rho + pz * pz);
-    return {static_cast<T>(px * scale),
-            static_cast<T>(py * scale),
-            static_cast<T>(pz * scale),
-            rho < W(max_rho) && pixelInRange(u, v)};
+  [[nodiscard, gnu::always_inline]] Attempt<Pixel<T>> attemptProject(T x, T y, T z) const {
+    const T r2 = x * x + y * y;
+    const T r = axisDistance(r2);
+    const T theta = polarAngle(r, z);
+    const auto& rho =
+        newtonSteps([&](T radius) { return mismatch(radius, r, z); }, start.at(theta));
+    const T scale = rho.x * (T(1) / r);
+    const T u = sensorU(x * scale, y * scale), v = sensorV(x * scale, y * scale);
+    const bool beyond = theta > T(max_theta) * (T(1) + T(8) * std::numeric_limits<T>::epsilon());
+    return {{u, v, allOf(rho.arrived, norm2InRange(r2 + z * z), pixelInRange(u, v))},
+            anyOf(allOf(rho.arrived, rho.x < T(max_rho)), beyond)};
+  }
+
+  template <class T>
+  [[nodiscard, gnu::always_inline]] Ray<T> unproject(T u, T v) const {
+    const auto& attempt = attemptUnproject(u, v);
+    if constexpr (std::is_same_v<T, float>) {
+      if (!attempt.settled) {
+        const Ray<double> ray = unproject<double>(u, v);
+        return {T(ray.x), T(ray.y), T(ray.z), ray.valid};
+      }
+    }
+    return attempt;
+  }
+
+  template <class T>
+  [[nodiscard, gnu::always_inline]] Attempt<Ray<T>> attemptUnproject(T u, T v) const {
+    const T inverse = T(1 / (c - d * e));
+    const T du = u - T(cx), dv = v - T(cy);
+    const T px = (T(c) * du - T(e) * dv) * inverse;
+    const T py = (dv - T(d) * du) * inverse;
+    const T rho2 = px * px + py * py;
+    const T rho = std::sqrt(rho2);
+    const T pz = forward(rho).value;
+    const T norm2 = rho2 + pz * pz;
+    const T norm = std::sqrt(norm2), scale = T(1) / norm;
+    const bool valid = allOf(rho < T(max_rho), pixelInRange(u, v));
+    // Far out, powers overflow a float.
+    const bool in_range = norm2 <= std::numeric_limits<T>::max();
+    // pz / norm is 1 on the axis, pz * scale may not be.
+    return {{px * scale, py * scale, pz / norm, valid}, anyOf(in_range, !valid)};
   }
 
   [[nodiscard]] ProjectionJacobian jacobian(double x, double y, double z) const {
     const double r = std::sqrt(x * x + y * y);  // 0 where project takes its limit, too.
     const double rho = sensorRadius<double>(r, z).rho;
-    const auto [value, slope] = forward(rho);
+    const auto [value, slope, curvature] = forward(rho);
     // d rho / d theta, from tan(theta) = rho / forward(rho).
     const double rise = (rho * rho + value * value) / (value - rho * slope) / (r * r + z * z);
     const ProjectionJacobian plane =
@@ -134,6 +162,36 @@ struct Ocam {
   [[nodiscard]] double maxFieldAngle() const { return max_theta; }
 
  private:
+  /// Up to here, in units of |a0|, the start is fitted.
+  static constexpr double kStartShare = 4;
+
+  template <class T>
+  [[nodiscard, gnu::always_inline]] T sensorU(T px, T py) const {
+    return px + T(e) * py + T(cx);
+  }
+  template <class T>
+  [[nodiscard, gnu::always_inline]] T sensorV(T px, T py) const {
+    return T(d) * px + T(c) * py + T(cy);
+  }
+
+  /// |(rho, forward)| sin(field angle of rho - field angle of the ray): rises through zero once.
+  template <class T>
+  [[nodiscard, gnu::always_inline]] Jet<T> mismatch(T rho, T across, T along) const {
+    const auto [value, slope, curvature] = forward(rho);
+    return {rho * along - value * across, along - slope * across, -curvature * across};
+  }
+
+  template <class T>
+  [[nodiscard]] Pixel<T> iterateProject(T x, T y, T z) const {
+    using W = Wider<T>;
+    const W r2 = W(x) * W(x) + W(y) * W(y);
+    const W across = std::sqrt(r2);
+    const T r = static_cast<T>(across);
+    const auto [rho, found] = sensorRadius<T>(across, z);
+    const T scale = r > T(0) ? rho / r : T(-a[0]) / z;
+    const T u = sensorU(x * scale, y * scale), v = sensorV(x * scale, y * scale);
+    return {u, v, found && norm2InRange(static_cast<T>(r2) + z * z) && pixelInRange(u, v)};
+  }
   template <class T>
   struct SensorRadius {
     T rho;
@@ -143,23 +201,21 @@ struct Ocam {
   /// rho in [0, max_rho) of a ray's parts across and along the axis.
   template <class T>
   [[nodiscard]] SensorRadius<T> sensorRadius(Wider<T> across, T along) const {
-    // |(rho, forward)| sin(field angle of rho - field angle of the ray): rises through zero once.
-    const auto mismatch = [&](auto rho) {
+    const auto f = [&](auto rho) {
       using S = decltype(rho);
-      const auto [value, slope] = forward(rho);
-      const S x = static_cast<S>(across), z = static_cast<S>(along);
-      return ValueAndSlope<S>{rho * z - value * x, z - slope * x};
+      const Jet<S> jet = mismatch(rho, static_cast<S>(across), static_cast<S>(along));
+      return ValueAndSlope<S>{jet.value, jet.slope};
     };
     const T hi = static_cast<T>(max_rho);
     // At the end, powers overflow a float.
-    const bool found = mismatch(static_cast<std::common_type_t<T, double>>(max_rho)).value > 0;
-    const T start = T(-a[0]) * std::atan2(static_cast<T>(across), along);
-    const T rho = found ? bracketedRoot(mismatch, T(0), hi, start < hi / 2 ? start : hi / 2) : T(0);
+    const bool found = f(static_cast<std::common_type_t<T, double>>(max_rho)).value > 0;
+    const T equidistant = T(-a[0]) * std::atan2(static_cast<T>(across), along);
+    const T rho = found ? bracketedRoot(f, T(0), hi, std::min(equidistant, hi / 2)) : T(0);
     // What rounding leaves; near the end of the domain, where the field angle is flat, that is
     // much.
     Wider<T> polished = rho;
     for (int i = 0; i < 3; ++i) {
-      const auto [value, slope] = mismatch(polished);
+      const auto [value, slope] = f(polished);
       polished -= value / slope;
     }
     const T answer = static_cast<T>(polished);

@@ -55,25 +55,98 @@ struct OmniRadtan {
   bool operator==(const OmniRadtan&) const = default;
 
   template <class T>
-  [[nodiscard]] Pixel<T> project(T x, T y, T z) const {
-    // Wider: the distortion multiplies relative errors of the plane's point, up to fivefold, where
-    // at the fold of the sphere the ray's own resolution does not excuse them.
-    using W = Wider<T>;
-    const W r2 = W(x) * x + W(y) * y;
-    const W norm2 = r2 + W(z) * z;
-    const W denom = denominator(r2, W(z), std::sqrt(norm2));
-    const W nx = x / denom, ny = y / denom;
-    const auto [mx, my] = radtan.distort(nx, ny);
-    const T u = static_cast<T>(W(fx) * mx + W(skew) * my + W(cx));
-    const T v = static_cast<T>(W(fy) * my + W(cy));
-    const bool before_fold = z >= T(0) || xi <= 1 || r2 > W((xi - 1) * (xi + 1)) * (W(z) * z);
-    const bool in_disc = denom > W(0) && std::sqrt(nx * nx + ny * ny) < W(radtan.max_radius);
-    return {
-        u, v, before_fold && in_disc && norm2InRange(static_cast<T>(norm2)) && pixelInRange(u, v)};
+  [[nodiscard, gnu::always_inline]] Pixel<T> project(T x, T y, T z) const {
+    const auto& attempt = attemptProject(x, y, z);
+    return attempt.settled ? static_cast<Pixel<T>>(attempt) : projectWide(x, y, z);
   }
 
   template <class T>
-  [[nodiscard]] Ray<T> unproject(T u, T v) const {
+  [[nodiscard, gnu::always_inline]] Attempt<Pixel<T>> attemptProject(T x, T y, T z) const {
+    const auto& plane = toPlane(x, y, z);
+    const auto [mx, my] = radtan.distort(plane.x, plane.y);
+    const T u = T(fx) * mx + T(skew) * my + T(cx);
+    const T v = T(fy) * my + T(cy);
+    const bool valid = allOf(plane.valid, norm2InRange(x * x + y * y + z * z), pixelInRange(u, v));
+    // The distortion multiplies relative errors of the plane's point by f' / R, and at the fold of
+    // the sphere the ray's own resolution does not excuse them.
+    const T t = plane.x * plane.x + plane.y * plane.y;
+    const T slope = T(1) + t * (T(3 * radtan.k1) + t * T(5 * radtan.k2));
+    const T ratio = T(1) + t * (T(radtan.k1) + t * T(radtan.k2));
+    return {{u, v, valid}, anyOf(slope <= T(2) * ratio, !valid)};
+  }
+
+  template <class T>
+  [[nodiscard, gnu::always_inline]] Ray<T> unproject(T u, T v) const {
+    const auto& attempt = attemptUnproject(u, v);
+    return attempt.settled ? static_cast<Ray<T>>(attempt) : iterateUnproject(u, v);
+  }
+
+  template <class T>
+  [[nodiscard, gnu::always_inline]] Attempt<Ray<T>> attemptUnproject(T u, T v) const {
+    const T my = (v - T(cy)) * (T(1) / T(fy));
+    const T mx = (u - T(cx) - T(skew) * my) * (T(1) / T(fx));
+    const auto& p = radtan.attemptUndistort(mx, my, max_radius);
+    const auto& ray = liftToSphere(p.x, p.y);
+    return {{ray.x, ray.y, ray.z, allOf(p.valid, pixelInRange(u, v))}, p.settled};
+  }
+
+  [[nodiscard]] ProjectionJacobian jacobian(double x, double y, double z) const {
+    const double r2 = x * x + y * y;
+    const double d = std::sqrt(r2 + z * z);
+    const auto [numerator, denominator] = inverseDepth(r2, z, d);
+    const double s = numerator / denominator;
+    const double slope = z >= 0 ? d + xi * z : (r2 - (xi - 1) * (xi + 1) * z * z) / (d - xi * z);
+    const double g = slope / d * (s * s);
+    const ProjectionJacobian plane = radialJacobian(1, 1, x, y, s, z * g, -std::sqrt(r2) * g);
+    Eigen::Matrix2d A;
+    A << fx, skew, 0, fy;
+    const ProjectionJacobian J = A * (radtan.jacobian(x * s, y * s) * plane);
+    // Euler: J ray = 0, which the product keeps only to rounding of its largest factor.
+    const Eigen::RowVector3d ray(x, y, z);
+    return J - (J * ray.transpose()) * (ray / (d * d));
+  }
+
+  [[nodiscard]] double maxFieldAngle() const { return max_theta; }
+
+ private:
+  template <class T>
+  struct Quotient {
+    T numerator, denominator;
+  };
+  /// 1 / (z + xi d), behind the camera without cancellation (UnifiedOmni).
+  template <class T>
+  [[nodiscard, gnu::always_inline]] Quotient<T> inverseDepth(T r2, T z, T d) const {
+    const bool front = z >= T(0);
+    const T behind = T(xi * xi) * r2 + T((xi - 1) * (xi + 1)) * (z * z);
+    return {select(front, T(1), T(xi) * d - z), select(front, z + T(xi) * d, behind)};
+  }
+
+  /// (x, y) / (z + xi d).
+  template <class T>
+  [[nodiscard, gnu::always_inline]] PlanePoint<T> toPlane(T x, T y, T z) const {
+    const T r2 = x * x + y * y;
+    const auto [numerator, denominator] = inverseDepth(r2, z, std::sqrt(r2 + z * z));
+    const T scale = numerator / denominator;
+    const T nx = x * scale, ny = y * scale;
+    return {nx,
+            ny,
+            allOf(anyOf(z >= T(0), xi <= 1, r2 > T((xi - 1) * (xi + 1)) * (z * z)),
+                  denominator > T(0),
+                  std::sqrt(nx * nx + ny * ny) < T(radtan.max_radius))};
+  }
+
+  template <class T>
+  [[nodiscard]] Pixel<T> projectWide(T x, T y, T z) const {
+    using W = Wider<T>;
+    const PlanePoint<W> plane = toPlane(W(x), W(y), W(z));
+    const auto [mx, my] = radtan.distort(plane.x, plane.y);
+    const T u = static_cast<T>(W(fx) * mx + W(skew) * my + W(cx));
+    const T v = static_cast<T>(W(fy) * my + W(cy));
+    return {u, v, plane.valid && norm2InRange(x * x + y * y + z * z) && pixelInRange(u, v)};
+  }
+
+  template <class T>
+  [[nodiscard]] Ray<T> iterateUnproject(T u, T v) const {
     using W = Wider<T>;
     const W my = (W(v) - W(cy)) / W(fy);
     const W mx = (W(u) - W(cx) - W(skew) * my) / W(fx);
@@ -85,40 +158,15 @@ struct OmniRadtan {
             valid && pixelInRange(u, v)};
   }
 
-  [[nodiscard]] ProjectionJacobian jacobian(double x, double y, double z) const {
-    const double r2 = x * x + y * y;
-    const double d = std::sqrt(r2 + z * z);
-    const double denom = denominator(r2, z, d);
-    const double slope = z >= 0 ? d + xi * z : (r2 - (xi - 1) * (xi + 1) * z * z) / (d - xi * z);
-    const double g = slope / (d * denom * denom);
-    const ProjectionJacobian plane =
-        radialJacobian(1, 1, x, y, 1 / denom, z * g, -std::sqrt(r2) * g);
-    Eigen::Matrix2d A;
-    A << fx, skew, 0, fy;
-    const ProjectionJacobian J = A * (radtan.jacobian(x / denom, y / denom) * plane);
-    // Euler: J ray = 0, which the product keeps only to rounding of its largest factor.
-    const Eigen::RowVector3d ray(x, y, z);
-    return J - (J * ray.transpose()) * (ray / (d * d));
-  }
-
-  [[nodiscard]] double maxFieldAngle() const { return max_theta; }
-
- private:
-  /// z + xi d, behind the camera without cancellation (UnifiedOmni).
-  template <class T>
-  [[nodiscard]] T denominator(T r2, T z, T d) const {
-    return z >= T(0) ? z + T(xi) * d
-                     : (T(xi * xi) * r2 + T((xi - 1) * (xi + 1)) * (z * z)) / (T(xi) * d - z);
-  }
-
   /// The unit ray of an undistorted point of the plane, up to the fold.
   template <class T>
-  [[nodiscard]] Ray<T> liftToSphere(T x, T y) const {
+  [[nodiscard, gnu::always_inline]] Ray<T> liftToSphere(T x, T y) const {
     const T m2 = x * x + y * y;
     const T disc = T(1) + T((1 - xi) * (1 + xi)) * m2;
-    const T root = std::sqrt(disc > T(0) ? disc : T(0));
-    const T scale = (T(xi) + root) / (T(1) + m2);
-    return {x * scale, y * scale, (root - T(xi) * m2) / (T(1) + m2), true};
+    const T root = std::sqrt(std::max(disc, T(0)));
+    const T inverse = T(1) / (T(1) + m2);
+    const T scale = (T(xi) + root) * inverse;
+    return {x * scale, y * scale, (root - T(xi) * m2) * inverse, true};
   }
 };
 static_assert(CameraModel<OmniRadtan>);

@@ -37,25 +37,28 @@ struct PinholeRadtan {
   bool operator==(const PinholeRadtan&) const = default;
 
   template <class T>
-  [[nodiscard]] Pixel<T> project(T x, T y, T z) const {
-    const T nx = x / z, ny = y / z;
+  [[nodiscard, gnu::always_inline]] Pixel<T> project(T x, T y, T z) const {
+    const T scale = T(1) / z;
+    const T nx = x * scale, ny = y * scale;
     const auto [mx, my] = radtan.distort(nx, ny);
     const T u = T(fx) * mx + T(cx);
     const T v = T(fy) * my + T(cy);
-    const bool in_disc = z > T(0) && std::sqrt(nx * nx + ny * ny) < T(radtan.max_radius);
-    return {u, v, in_disc && norm2InRange(x * x + y * y + z * z) && pixelInRange(u, v)};
+    const bool in_disc = allOf(z > T(0), std::sqrt(nx * nx + ny * ny) < T(radtan.max_radius));
+    return {u, v, allOf(in_disc, norm2InRange(x * x + y * y + z * z), pixelInRange(u, v))};
   }
 
   template <class T>
-  [[nodiscard]] Ray<T> unproject(T u, T v) const {
-    using W = Wider<T>;
-    const auto [x, y, valid] =
-        radtan.undistort<T>((W(u) - W(cx)) / W(fx), (W(v) - W(cy)) / W(fy), radtan.max_radius);
-    const auto scale = 1 / std::sqrt(x * x + y * y + 1);
-    return {static_cast<T>(x * scale),
-            static_cast<T>(y * scale),
-            static_cast<T>(scale),
-            valid && pixelInRange(u, v)};
+  [[nodiscard, gnu::always_inline]] Ray<T> unproject(T u, T v) const {
+    const auto& attempt = attemptUnproject(u, v);
+    return attempt.settled ? static_cast<Ray<T>>(attempt) : iterateUnproject(u, v);
+  }
+
+  template <class T>
+  [[nodiscard, gnu::always_inline]] Attempt<Ray<T>> attemptUnproject(T u, T v) const {
+    const auto& p = radtan.attemptUndistort(
+        (u - T(cx)) * (T(1) / T(fx)), (v - T(cy)) * (T(1) / T(fy)), radtan.max_radius);
+    const T scale = T(1) / std::sqrt(p.x * p.x + p.y * p.y + T(1));
+    return {{p.x * scale, p.y * scale, scale, allOf(p.valid, pixelInRange(u, v))}, p.settled};
   }
 
   [[nodiscard]] ProjectionJacobian jacobian(double x, double y, double z) const {
@@ -73,6 +76,19 @@ struct PinholeRadtan {
 
   [[nodiscard]] double maxFieldAngle() const {
     return radtan.max_radius < Radtan::kUnbounded ? std::atan(radtan.max_radius) : M_PI / 2;
+  }
+
+ private:
+  template <class T>
+  [[nodiscard]] Ray<T> iterateUnproject(T u, T v) const {
+    using W = Wider<T>;
+    const auto [x, y, valid] =
+        radtan.undistort<T>((W(u) - W(cx)) / W(fx), (W(v) - W(cy)) / W(fy), radtan.max_radius);
+    const auto scale = 1 / std::sqrt(x * x + y * y + 1);
+    return {static_cast<T>(x * scale),
+            static_cast<T>(y * scale),
+            static_cast<T>(scale),
+            valid && pixelInRange(u, v)};
   }
 };
 static_assert(CameraModel<PinholeRadtan>);

@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <type_traits>
 
+#include "cameras/camera_model.h"
 #include "cameras/newton.h"
 #include "cameras/polynomial.h"
 
@@ -40,14 +42,32 @@ struct Radtan {
 
   double k1 = 0, k2 = 0, p1 = 0, p2 = 0, k3 = 0;
   double max_radius = kUnbounded;  ///< Derived.
+  FittedStart start{};             ///< Derived: of r over f(r), without tangential distortion.
 
   [[nodiscard]] static Radtan make(double k1, double k2, double p1, double p2, double k3) {
-    return {k1, k2, p1, p2, k3, findMaxRadius(k1, k2, k3, std::hypot(p1, p2))};
+    Radtan m{k1, k2, p1, p2, k3, findMaxRadius(k1, k2, k3, std::hypot(p1, p2)), {}};
+    const std::vector<double> turns =
+        signChanges(std::array<double, 4>{1, 3 * k1, 5 * k2, 7 * k3}, 0, kUnbounded);
+    const double fold = turns.empty() ? kUnbounded : std::sqrt(turns.front());
+    const auto radial = [&](double r) -> ValueAndSlope<double> {
+      const double t = r * r;
+      return {r + r * t * (k1 + t * (k2 + t * k3)), 1 + t * (3 * k1 + t * (5 * k2 + t * 7 * k3))};
+    };
+    m.start = FittedStart::fit(
+        radial(std::min(fold, kStartRadius)).value, radial(fold).value, [&](double f) {
+          const auto above = [&](double r) -> ValueAndSlope<double> {
+            const auto [value, slope] = radial(r);
+            return {value - f, slope};
+          };
+          const double hi = std::min(fold, kStartRadius);
+          return bracketedRoot(above, 0.0, hi, hi / 2);
+        });
+    return m;
   }
   bool operator==(const Radtan&) const = default;
 
   template <class T>
-  [[nodiscard]] std::array<T, 2> distort(T x, T y) const {
+  [[nodiscard, gnu::always_inline]] std::array<T, 2> distort(T x, T y) const {
     const T t = x * x + y * y;
     const T factor = T(1) + t * (T(k1) + t * (T(k2) + t * T(k3))) + T(2) * (T(p2) * x + T(p1) * y);
     return {x * factor + T(p2) * t, y * factor + T(p1) * t};
@@ -66,27 +86,60 @@ struct Radtan {
     return J;
   }
 
+  /// As undistort in a fixed number of Newton's steps, in both coordinates from the fitted start.
+  template <class T>
+  [[nodiscard, gnu::always_inline]] Attempt<PlanePoint<T>> attemptUndistort(T u,
+                                                                            T v,
+                                                                            double radius) const {
+    const T p_size = T(std::abs(p1) + std::abs(p2));
+    const T m = axisDistance(u * u + v * v);
+    const T scale = start.at(m) * (T(1) / m);
+    // The start lacks the tangential part: 1e-2, 1e-4, 1e-8, 1e-16 where that is strong.
+    Step<T> q{u * scale, v * scale, 0, 0};
+    q = newtonStep(q, u, v);
+    q = newtonStep(q, u, v);
+    if constexpr (!std::is_same_v<T, float>) q = newtonStep(q, u, v);
+    q = newtonStep(q, u, v);
+    // What the last step leaves is at most step^2 |J'| / (2 smallest singular value of J), and that
+    // singular value at least determinant / |J|. The bend is more than |J| and r |J'|.
+    const T r2 = q.x * q.x + q.y * q.y;
+    const T bend =
+        T(1) + T(6) * p_size * (T(1) + r2) +
+        r2 * (T(6 * std::abs(k1)) + r2 * (T(20 * std::abs(k2)) + r2 * T(42 * std::abs(k3))));
+    const T t_end = T(radius) * T(radius);
+    const bool arrived =
+        allOf(q.step2 * (bend * bend) <= std::numeric_limits<T>::epsilon() * q.determinant * r2,
+              r2 < t_end);
+    // |D| is at most f + 3 |p| r^2.
+    const T furthest = T(radius) * (T(1) + t_end * (T(k1) + t_end * (T(k2) + t_end * T(k3)))) +
+                       T(3) * p_size * t_end;
+    const bool outside = m > furthest * (T(1) + T(8) * std::numeric_limits<T>::epsilon());
+    return {{q.x, q.y, arrived}, anyOf(arrived, outside)};
+  }
+
   /// The point of the disc r < `radius` (at most max_radius) that D maps to (u, v), to more bits
   /// than T has. Exact: valid if and only if there is one.
   template <class T>
   [[nodiscard]] PlanePoint<Wider<T>> undistort(Wider<T> u, Wider<T> v, double radius) const {
     using W = Wider<T>;
     const T mx = static_cast<T>(u), my = static_cast<T>(v);
-    const T px = T(p2), py = T(p1);
-    const auto h = [&](T r) -> ValueAndSlope<T> {
-      const T t = r * r;
-      const T ax = mx - px * t, ay = my - py * t;
-      const T length = std::sqrt(ax * ax + ay * ay);
-      const T inverse = length > T(0) ? T(1) / length : T(0);
-      const T along = (px * ax + py * ay) * inverse;
-      const T across = (py * ax - px * ay) * inverse;
-      const T value =
-          r * (T(1) + t * (T(k1) + t * (T(k2) + t * T(k3)))) - length + T(2) * t * along;
-      const T slope = T(1) + t * (T(3 * k1) + t * (T(5 * k2) + t * T(7 * k3))) + T(6) * r * along -
-                      T(4) * r * t * (across * across) * inverse;
-      return {value, slope};
+    const auto h = [&](auto r) {
+      using S = decltype(r);
+      const S px = S(p2), py = S(p1), t = r * r;
+      const S ax = S(mx) - px * t, ay = S(my) - py * t;
+      const S length = std::sqrt(ax * ax + ay * ay);
+      const S inverse = length > S(0) ? S(1) / length : S(0);
+      const S along = (px * ax + py * ay) * inverse;
+      const S across = (py * ax - px * ay) * inverse;
+      const S value =
+          r * (S(1) + t * (S(k1) + t * (S(k2) + t * S(k3)))) - length + S(2) * t * along;
+      const S slope = S(1) + t * (S(3 * k1) + t * (S(5 * k2) + t * S(7 * k3))) + S(6) * r * along -
+                      S(4) * r * t * (across * across) * inverse;
+      return ValueAndSlope<S>{value, slope};
     };
-    const bool valid = radius >= kUnbounded || h(T(radius)).value > T(0);
+    // At the end, powers overflow a float.
+    const bool valid =
+        radius >= kUnbounded || h(static_cast<std::common_type_t<T, double>>(radius)).value > 0;
     const T hi = T(radius);
     const T length = std::sqrt(mx * mx + my * my);
     const T r = valid ? bracketedRoot(h, T(0), hi, length < hi / 2 ? length : hi / 2) : T(0);
@@ -108,6 +161,33 @@ struct Radtan {
   }
 
  private:
+  /// Up to here the start is fitted.
+  static constexpr double kStartRadius = 1.5;
+
+  /// A point, the squared length of the step that led to it, and det J where that step began.
+  template <class T>
+  struct Step {
+    T x, y, step2, determinant;
+  };
+  /// Newton's step towards D(x, y) = (u, v).
+  template <class T>
+  [[nodiscard, gnu::always_inline]] Step<T> newtonStep(const Step<T>& q, T u, T v) const {
+    const T t = q.x * q.x + q.y * q.y;
+    const T radial = t * (T(k1) + t * (T(k2) + t * T(k3))) + T(2) * (T(p2) * q.x + T(p1) * q.y);
+    const T slope = T(2) * (T(k1) + t * (T(2 * k2) + t * T(3 * k3)));
+    const T xx = T(1) + (radial + q.x * q.x * slope + T(4 * p2) * q.x);
+    const T yy = T(1) + (radial + q.y * q.y * slope + T(4 * p1) * q.y);
+    const T xy = q.x * q.y * slope + T(2) * (T(p1) * q.x + T(p2) * q.y);
+    // x - u is exact near the solution, so the error is the distortion's alone.
+    const T off_u = (q.x - u) + (q.x * radial + T(p2) * t);
+    const T off_v = (q.y - v) + (q.y * radial + T(p1) * t);
+    const T determinant = xx * yy - xy * xy;
+    const T inverse = T(1) / determinant;
+    const T dx = (yy * off_u - xy * off_v) * inverse;
+    const T dy = (xx * off_v - xy * off_u) * inverse;
+    return {q.x - dx, q.y - dy, dx * dx + dy * dy, determinant};
+  }
+
   [[nodiscard]] static double findMaxRadius(double k1, double k2, double k3, double p) {
     const std::array<double, 7> radial{1, -6 * p, 3 * k1, 0, 5 * k2, 0, 7 * k3};  // f' - 3 q
     const std::array<double, 7> skewed{

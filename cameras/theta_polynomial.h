@@ -14,7 +14,8 @@ namespace dlsd {
 ///
 /// Domain: theta < max_theta, where max_theta is the smallest positive sign change of rho'(theta),
 /// or pi if there is none below pi; pixels with |(u - cx, (v - cy) / aspect)| < rho(max_theta).
-/// Solved once in fromParams. The inverse is a bracketed Newton iteration, run to the last bits.
+/// Solved once in fromParams. The inverse is as that of KannalaBrandt: two of Newton's steps from a
+/// fitted start, else a bracketed iteration, run to the last bits.
 /// k2 = k3 = k4 = 0 is the equidistant projection. Source: Yogamani et al., "WoodScape" (ICCV
 /// 2019).
 struct ThetaPolynomial {
@@ -32,6 +33,7 @@ struct ThetaPolynomial {
   double k1 = 1, k2 = 0, k3 = 0, k4 = 0, aspect = 1, cx = 0, cy = 0;
   double max_theta = M_PI;   ///< Derived, rad.
   double max_radius = M_PI;  ///< Derived: rho(max_theta), px.
+  FittedStart start{};       ///< Derived: of the field angle over rho.
 
   [[nodiscard]] static ThetaPolynomial fromParams(const std::array<double, 7>& p) {
     ThetaPolynomial m{p[0], p[1], p[2], p[3], p[4], p[5], p[6]};
@@ -39,6 +41,9 @@ struct ThetaPolynomial {
     const std::vector<double> turns = signChanges(slope, 0, M_PI);
     if (!turns.empty()) m.max_theta = turns.front();
     m.max_radius = m.radius(m.max_theta);
+    m.start = FittedStart::fit(m.radius(std::min(m.max_theta, kStartAngle)),
+                               m.max_radius,
+                               [&](double rho) { return m.fieldAngle(rho); });
     return m;
   }
   [[nodiscard]] std::array<double, 7> params() const { return {k1, k2, k3, k4, aspect, cx, cy}; }
@@ -46,48 +51,56 @@ struct ThetaPolynomial {
 
   /// rho, px.
   template <class T>
-  [[nodiscard]] T radius(T theta) const {
-    return theta * (T(k1) + theta * (T(k2) + theta * (T(k3) + theta * T(k4))));
+  [[nodiscard, gnu::always_inline]] T radius(T theta) const {
+    return theta * ((T(k1) + theta * T(k2)) + (theta * theta) * (T(k3) + theta * T(k4)));
   }
   template <class T>
-  [[nodiscard]] T radiusSlope(T theta) const {
-    return T(k1) + theta * (T(2 * k2) + theta * (T(3 * k3) + theta * T(4 * k4)));
+  [[nodiscard, gnu::always_inline]] T radiusSlope(T theta) const {
+    return (T(k1) + theta * T(2 * k2)) + (theta * theta) * (T(3 * k3) + theta * T(4 * k4));
   }
 
   template <class T>
-  [[nodiscard]] Pixel<T> project(T x, T y, T z) const {
+  [[nodiscard, gnu::always_inline]] Pixel<T> project(T x, T y, T z) const {
     const T r2 = x * x + y * y;
-    const T r = std::sqrt(r2);
-    const T theta = std::atan2(r, z);
-    const T scale = r > T(0) ? radius(theta) / r : T(k1) / z;
+    const T r = axisDistance(r2);
+    const T theta = polarAngle(r, z);
+    const T scale = radius(theta) * (T(1) / r);
     const T u = x * scale + T(cx);
     const T v = T(aspect) * (y * scale) + T(cy);
-    return {u, v, theta < T(max_theta) && norm2InRange(r2 + z * z) && pixelInRange(u, v)};
+    return {u, v, allOf(theta < T(max_theta), norm2InRange(r2 + z * z), pixelInRange(u, v))};
   }
 
   template <class T>
-  [[nodiscard]] Ray<T> unproject(T u, T v) const {
-    const T mx = u - T(cx);
-    const T my = (v - T(cy)) / T(aspect);
-    const T rho = std::sqrt(mx * mx + my * my);
-    if (!(rho < T(max_radius)) || !pixelInRange(u, v)) return {T(0), T(0), T(1), false};
-    const T theta = fieldAngle(rho);
-    const T scale = rho > T(0) ? std::sin(theta) / rho : T(1 / k1);
-    return {mx * scale, my * scale, std::cos(theta), theta < T(max_theta)};
+  [[nodiscard, gnu::always_inline]] Ray<T> unproject(T u, T v) const {
+    const auto& attempt = attemptUnproject(u, v);
+    return attempt.settled ? static_cast<Ray<T>>(attempt) : iterateUnproject(u, v);
+  }
+
+  template <class T>
+  [[nodiscard, gnu::always_inline]] Attempt<Ray<T>> attemptUnproject(T u, T v) const {
+    const auto& m = radial(u, v);
+    const auto& theta = newtonSteps(
+        [&](T a) {
+          return Jet<T>{(T(k1) * a - m.rho) + (a * a) * (T(k2) + a * (T(k3) + a * T(k4))),
+                        radiusSlope(a),
+                        T(2 * k2) + a * (T(6 * k3) + a * T(12 * k4))};
+        },
+        start.at(m.rho));
+    return {rayAt(m, theta.x), anyOf(allOf(theta.arrived, theta.x < T(max_theta)), !m.valid)};
   }
 
   /// theta in [0, max_theta] with rho(theta) = rho, for 0 <= rho < max_radius.
   template <class T>
   [[nodiscard]] T fieldAngle(T rho) const {
     const T hi = T(max_theta);
-    const T start = rho / T(k1);
+    const T equidistant = rho / T(k1);
     const T theta = bracketedRoot(
         [&](T x) {
           return ValueAndSlope<T>{radius(x) - rho, radiusSlope(x)};
         },
         T(0),
         hi,
-        start < hi / 2 ? start : hi / 2);
+        std::min(equidistant, hi / 2));
     // What the polynomial's own rounding leaves, by one more step in higher precision.
     const Wider<T> wide = theta;
     const T polished =
@@ -97,13 +110,42 @@ struct ThetaPolynomial {
 
   [[nodiscard]] ProjectionJacobian jacobian(double x, double y, double z) const {
     const double r = std::sqrt(x * x + y * y);  // 0 where project takes its limit, too.
-    const double theta = std::atan2(r, z);
+    const double theta = polarAngle(r, z);
     const double slope = radiusSlope(theta) / (r * r + z * z);
     const double s = r > 0 ? radius(theta) / r : k1 / z;
     return radialJacobian(1, aspect, x, y, s, slope * z, -slope * r);
   }
 
   [[nodiscard]] double maxFieldAngle() const { return max_theta; }
+
+ private:
+  /// Up to here the start is fitted; few lenses see further.
+  static constexpr double kStartAngle = 2.0;
+
+  /// A pixel relative to the principal point, aspect taken out, and its distance from there, px.
+  template <class T>
+  struct Radial {
+    T x, y, rho;
+    bool valid;
+  };
+  template <class T>
+  [[nodiscard, gnu::always_inline]] Radial<T> radial(T u, T v) const {
+    const T mx = u - T(cx);
+    const T my = (v - T(cy)) * (T(1) / T(aspect));
+    const T rho = axisDistance(mx * mx + my * my);
+    return {mx, my, rho, allOf(rho < T(max_radius), pixelInRange(u, v))};
+  }
+  template <class T>
+  [[nodiscard, gnu::always_inline]] Ray<T> rayAt(const Radial<T>& m, T theta) const {
+    const auto [sine, cosine] = sinCos(theta);
+    const T scale = sine * (T(1) / m.rho);
+    return {m.x * scale, m.y * scale, cosine, allOf(m.valid, theta < T(max_theta))};
+  }
+  template <class T>
+  [[nodiscard]] Ray<T> iterateUnproject(T u, T v) const {
+    const Radial<T> m = radial(u, v);
+    return rayAt(m, m.valid ? fieldAngle(m.rho) : T(0));
+  }
 };
 static_assert(CameraModel<ThetaPolynomial>);
 

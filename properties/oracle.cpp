@@ -354,7 +354,7 @@ S ocamSum(const Ocam& m, const S& rho, OcamSum which) {
 Real maxRho(const Ocam& model) {
   return remembered(model, [](const Ocam& m) {
     return firstFall(
-        [&](Real rho) { return ocamSum(m, rho, OcamSum::kPowerLessOneTimes); }, 1e-6L, 1e13L);
+        [&](Real rho) { return ocamSum(m, rho, OcamSum::kPowerLessOneTimes); }, 1e-6L, 1e31L);
   });
 }
 /// rho of a field angle below the largest one, by bisection of the equation that defines it.
