@@ -502,8 +502,24 @@ std::vector<Eigen::Vector2d> imageCurve(
     // Past a pole, where the longitude runs away like 1 / t, up to twice as far beside the middle.
     return curveOf(camera, SeamedSampler(arc, t0, t1), t0, t1, 0.45 * max_chord_err_px);
   }
+  const ArcSampler sampler(arc);
+  if (std::holds_alternative<ThetaPolynomial>(camera.model()) ||
+      std::holds_alternative<Ocam>(camera.model())) {
+    // These bend lines sharply where they pass the optical axis, maybe between all places where
+    // curveOf looks: cut there.
+    const double t_axis =
+        std::atan2(sampler.side().z(), sampler.from().z()) / std::max(sampler.angle(), 1e-300);
+    if (t_axis > t0 && t_axis < t1) {
+      const double tolerance = 0.6 * max_chord_err_px;
+      std::vector<Eigen::Vector2d> points = curveOf(camera, sampler, t0, t_axis, tolerance);
+      const std::vector<Eigen::Vector2d> rest = curveOf(camera, sampler, t_axis, t1, tolerance);
+      const bool both = !points.empty() && !rest.empty() && points.back() == rest.front();
+      points.insert(points.end(), rest.begin() + (both ? 1 : 0), rest.end());
+      return points;
+    }
+  }
   // The curve may be a little further from its chord beside the middle, where it is measured.
-  return curveOf(camera, ArcSampler(arc), t0, t1, 0.9 * max_chord_err_px);
+  return curveOf(camera, sampler, t0, t1, 0.9 * max_chord_err_px);
 }
 
 }  // namespace dlsd

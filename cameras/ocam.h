@@ -149,9 +149,12 @@ struct Ocam {
   [[nodiscard]] ProjectionJacobian jacobian(double x, double y, double z) const {
     const double r = std::sqrt(x * x + y * y);  // 0 where project takes its limit, too.
     const double rho = sensorRadius<double>(r, z).rho;
-    const auto [value, slope, curvature] = forward(rho);
+    const double value = forward(rho).value;
+    // value - rho slope; its terms without a1, which cancels.
+    double turning = 0;
+    for (size_t i = 9; i-- > 0;) turning = turning * rho + (static_cast<double>(i) - 1) * a[i];
     // d rho / d theta, from tan(theta) = rho / forward(rho).
-    const double rise = (rho * rho + value * value) / (value - rho * slope) / (r * r + z * z);
+    const double rise = (rho * rho + value * value) / turning / (r * r + z * z);
     const ProjectionJacobian plane =
         radialJacobian(1, 1, x, y, r > 0 ? rho / r : -a[0] / z, rise * z, -rise * r);
     Eigen::Matrix2d A;
