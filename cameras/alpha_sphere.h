@@ -11,6 +11,7 @@
 #include <cmath>
 
 #include "cameras/fast_math.h"
+#include "cameras/mutant.h"
 
 namespace dlsd {
 
@@ -40,7 +41,8 @@ struct AlphaSphere {
   template <class T>
   [[nodiscard, gnu::always_inline]] bool beforeFold(T r2, T z) const {
     const T b = T(1 - alpha);
-    return anyOf(alpha <= 0.5, z > T(0), b * b * r2 > T(2 * alpha - 1) * (z * z));
+    const T c = T(2 * alpha - (DLSD_MUTANT("alpha-fold") ? 1 + 1e-7 : 1));
+    return anyOf(alpha <= 0.5, z > T(0), b * b * r2 > c * (z * z));
   }
 
   /// alpha z + (1 - alpha) d, which vanishes at the fold. dm / dpsi, psi = atan2(r, z), is this

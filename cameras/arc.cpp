@@ -9,6 +9,8 @@
 #include <tuple>
 #include <utility>
 
+#include "cameras/mutant.h"
+
 namespace dlsd {
 namespace {
 
@@ -197,7 +199,7 @@ template <class Sampler>
 double lastInside(
     const Camera& camera, const Sampler& arc, double t_in, double t_out, Where* outside) {
   *outside = whereIs(camera, arc, t_out);
-  while (std::abs(t_out - t_in) > 1e-13) {
+  while (std::abs(t_out - t_in) > (DLSD_MUTANT("arc-border") ? 1e-7 : 1e-13)) {
     const double t = t_in + (t_out - t_in) / 2;
     if (t == t_in || t == t_out) break;
     const Where w = whereIs(camera, arc, t);
@@ -404,7 +406,7 @@ std::optional<Arc> arcBetween(const Eigen::Vector3d& from, const Eigen::Vector3d
   // a x (b - a) = a x b = a x (b + a), whichever factor is small: without it, nearly (anti)parallel
   // rays would leave a normal that is perpendicular to neither.
   const Eigen::Vector3d n = a.cross(a.dot(b) > 0 ? Eigen::Vector3d(b - a) : Eigen::Vector3d(b + a));
-  const double sine = n.norm();
+  const double sine = DLSD_MUTANT("arc-normal") ? n.norm() * (1 + 1e-12) : n.norm();
   if (!(sine > 1e-12)) return std::nullopt;
   return Arc{n / sine, a, b};
 }
@@ -519,7 +521,8 @@ std::vector<Eigen::Vector2d> imageCurve(
     }
   }
   // The curve may be a little further from its chord beside the middle, where it is measured.
-  return curveOf(camera, sampler, t0, t1, 0.9 * max_chord_err_px);
+  return curveOf(
+      camera, sampler, t0, t1, (DLSD_MUTANT("arc-chord") ? 1.5 : 0.9) * max_chord_err_px);
 }
 
 }  // namespace dlsd

@@ -17,6 +17,7 @@
 #include <variant>
 
 #include "cameras/camera.h"
+#include "cameras/mutant.h"
 
 #ifdef __clang__
 #pragma clang diagnostic ignored "-Wpass-failed"  // Models with branches stay scalar.
@@ -129,6 +130,10 @@ DLSD_BATCH_TARGET void unprojectBlock(const M& model,
     for (size_t i = 0; i < n; ++i) valid[i] = static_cast<uint8_t>(flag[i]);
     for (size_t i = 0; i < n; ++i) {
       if (valid[i] != kUnsettled) continue;
+      if (DLSD_MUTANT("batch-unsettled")) {
+        valid[i] = kInvalid;
+        continue;
+      }
       const Ray<T> ray = m.unproject(u[i], v[i]);
       x[i] = ray.x;
       y[i] = ray.y;
@@ -175,7 +180,8 @@ void project(const Camera& camera,
   std::visit(
       [&](const auto& m) {
         for (size_t i = 0; i < n; i += kBlock) {
-          const size_t count = std::min(kBlock, n - i);
+          size_t count = std::min(kBlock, n - i);
+          if (DLSD_MUTANT("batch-tail") && count % 8 == 7) --count;
           projectBlock(m, x + i, y + i, z + i, u + i, v + i, valid + i, count);
           if (limited) limitBlock(camera.angleLimit(), x + i, y + i, z + i, valid + i, count);
         }

@@ -28,6 +28,7 @@
 #include <string_view>
 
 #include "cameras/fast_math.h"
+#include "cameras/mutant.h"
 
 namespace dlsd {
 
@@ -97,7 +98,8 @@ struct FieldAngleLimit {
 
   template <class T>
   [[nodiscard, gnu::always_inline]] bool admits(T x, T y, T z) const {
-    return z * T(sine) >= std::sqrt(x * x + y * y) * T(cosine);
+    const T r = std::sqrt(x * x + y * y) * T(DLSD_MUTANT("field-angle-limit") ? 1 - 1e-9 : 1);
+    return z * T(sine) >= r * T(cosine);
   }
 };
 

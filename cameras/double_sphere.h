@@ -1,6 +1,7 @@
 #pragma once
 #include "cameras/alpha_sphere.h"
 #include "cameras/camera_model.h"
+#include "cameras/mutant.h"
 
 namespace dlsd {
 
@@ -62,6 +63,12 @@ struct DoubleSphere {
     const T u = T(fx) * (x * scale) + T(cx);
     const T v = T(fy) * (y * scale) + T(cy);
     const bool before_first_fold = anyOf(xi <= 1, z >= T(0), r2 > T((xi - 1) * (xi + 1)) * (z * z));
+    // The bound that was published: z > -w2 d1.
+    const T w1 = T(alpha <= 0.5 ? alpha / (1 - alpha) : (1 - alpha) / alpha);
+    const T w2 = (w1 + T(xi)) / std::sqrt(T(2) * w1 * T(xi) + T(xi * xi) + T(1));
+    if (DLSD_MUTANT("double-sphere-published")) {
+      return {u, v, allOf(z > -w2 * std::sqrt(norm2), norm2InRange(norm2), pixelInRange(u, v))};
+    }
     return {u,
             v,
             allOf(denominator > T(0),

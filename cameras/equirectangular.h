@@ -1,5 +1,6 @@
 #pragma once
 #include "cameras/camera_model.h"
+#include "cameras/mutant.h"
 
 namespace dlsd {
 
@@ -47,7 +48,8 @@ struct Equirectangular {
     const bool pole = allOf(x == T(0), z == T(0));
     const T from_axis = std::min(polarAngle(std::abs(x), select(pole, T(1), z)), kPi<T>);
     const T from_equator = polarAngle(std::abs(y), h);
-    const T longitude = select(x > T(0), from_axis, -from_axis);
+    const bool right = DLSD_MUTANT("panorama-seam") ? x >= T(0) : x > T(0);
+    const T longitude = select(right, from_axis, -from_axis);
     const T latitude = select(y > T(0), from_equator, -from_equator);
     const T u = T(fx) * longitude + T(cx);
     const T v = T(fy) * latitude + T(cy);

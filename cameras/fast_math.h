@@ -15,6 +15,8 @@
 #include <cmath>
 #include <type_traits>
 
+#include "cameras/mutant.h"
+
 namespace dlsd {
 
 /// condition ? a : b with both evaluated: what compilers turn into a blend.
@@ -66,7 +68,8 @@ template <class T>
                 w2 * (-0.14285714285391062856 + w * 0.11111111088368736471);
     const T b = (-0.090909081514336384598 + w * 0.076922829150930291504) +
                 w2 * (-0.066662290712999844342 + w * 0.058770444923136422102);
-    const T c = (-0.052185506979205859484 + w * 0.045041452498199846082) +
+    const T c = (-0.052185506979205859484 +
+                 w * (DLSD_MUTANT("atan-coefficient") ? 0.045 : 0.045041452498199846082)) +
                 w2 * (-0.033488349562296842627 + w * 0.015209285088557111772);
     return a + w4 * (b + w4 * c);
   }

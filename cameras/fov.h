@@ -1,5 +1,6 @@
 #pragma once
 #include "cameras/camera_model.h"
+#include "cameras/mutant.h"
 
 namespace dlsd {
 
@@ -29,7 +30,13 @@ struct Fov {
   double two_tan_half_omega = 0;  ///< Derived.
 
   [[nodiscard]] static Fov fromParams(const std::array<double, 5>& p) {
-    return {p[0], p[1], p[2], p[3], p[4], 2 * std::tan(p[4] / 2)};
+    return {p[0],
+            p[1],
+            p[2],
+            p[3],
+            p[4],
+            DLSD_MUTANT("fov-series") && p[4] < 0.01 ? p[4] - p[4] * p[4] * p[4] / 12
+                                                     : 2 * std::tan(p[4] / 2)};
   }
   [[nodiscard]] std::array<double, 5> params() const { return {fx, fy, cx, cy, omega}; }
   bool operator==(const Fov&) const = default;
@@ -64,7 +71,7 @@ struct Fov {
     return {mx * scale,
             my * scale,
             z * inv_norm,
-            allOf(anyOf(pinhole, alpha < T(M_PI)), pixelInRange(u, v))};
+            allOf(anyOf(pinhole, alpha < T(M_PI), DLSD_MUTANT("fov-wrap")), pixelInRange(u, v))};
   }
 
   [[nodiscard]] ProjectionJacobian jacobian(double x, double y, double z) const {

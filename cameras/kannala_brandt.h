@@ -2,6 +2,7 @@
 #include <algorithm>
 
 #include "cameras/camera_model.h"
+#include "cameras/mutant.h"
 #include "cameras/newton.h"
 #include "cameras/polynomial.h"
 
@@ -43,6 +44,7 @@ struct KannalaBrandt {
     const std::array<double, 5> slope{1, 3 * m.k1, 5 * m.k2, 7 * m.k3, 9 * m.k4};
     const std::vector<double> turns = signChanges(slope, 0, M_PI * M_PI);
     if (!turns.empty()) m.max_theta = std::min(std::sqrt(turns.front()), M_PI);
+    if (DLSD_MUTANT("kb-domain")) m.max_theta = std::min(m.max_theta * (1 + 1e-6), M_PI);
     m.max_radius = m.distort(m.max_theta);
     m.start = FittedStart::fit(m.distort(std::min(m.max_theta, kStartAngle)),
                                m.max_radius,
@@ -104,7 +106,8 @@ struct KannalaBrandt {
   [[nodiscard]] ProjectionJacobian jacobian(double x, double y, double z) const {
     const double r = std::sqrt(x * x + y * y);  // 0 where project takes its limit, too.
     const double theta = polarAngle(r, z);
-    const double slope = distortSlope(theta) / (r * r + z * z);
+    const double slope =
+        (distortSlope(theta) * (DLSD_MUTANT("kb-jacobian") ? 1 + 1e-9 : 1)) / (r * r + z * z);
     const double s = r > 0 ? distort(theta) / r : 1 / z;
     return radialJacobian(fx, fy, x, y, s, slope * z, -slope * r);
   }

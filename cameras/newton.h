@@ -6,6 +6,7 @@
 #include <type_traits>
 
 #include "cameras/fast_math.h"
+#include "cameras/mutant.h"
 #include "cameras/polynomial.h"
 
 namespace dlsd {
@@ -69,7 +70,7 @@ template <class T, class Function>
     left = (step * step) * std::abs(f.curvature);
     allowed = std::numeric_limits<T>::epsilon() * x * f.slope;
   }
-  return {x, allOf(left <= allowed, x > T(0))};
+  return {x, allOf(anyOf(left <= allowed, DLSD_MUTANT("newton-residual")), x > T(0))};
 }
 
 /// Where Newton's method for the inverse y of a rising x(y), y(0) = 0, starts: y / x as a

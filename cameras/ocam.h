@@ -4,6 +4,7 @@
 #include <type_traits>
 
 #include "cameras/camera_model.h"
+#include "cameras/mutant.h"
 #include "cameras/newton.h"
 #include "cameras/polynomial.h"
 
@@ -174,7 +175,7 @@ struct Ocam {
   }
   template <class T>
   [[nodiscard, gnu::always_inline]] T sensorV(T px, T py) const {
-    return T(d) * px + T(c) * py + T(cy);
+    return T(DLSD_MUTANT("ocam-affine") ? e : d) * px + T(c) * py + T(cy);
   }
 
   /// |(rho, forward)| sin(field angle of rho - field angle of the ray): rises through zero once.

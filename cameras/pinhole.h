@@ -1,5 +1,6 @@
 #pragma once
 #include "cameras/camera_model.h"
+#include "cameras/mutant.h"
 
 namespace dlsd {
 
@@ -28,7 +29,11 @@ struct Pinhole {
     const T scale = T(1) / z;
     const T u = T(fx) * (x * scale) + T(cx);
     const T v = T(fy) * (y * scale) + T(cy);
-    return {u, v, allOf(z > T(0), norm2InRange(x * x + y * y + z * z), pixelInRange(u, v))};
+    return {u,
+            v,
+            allOf(anyOf(z > T(0), DLSD_MUTANT("pinhole-behind")),
+                  norm2InRange(x * x + y * y + z * z),
+                  pixelInRange(u, v))};
   }
 
   template <class T>
@@ -36,7 +41,7 @@ struct Pinhole {
     const T mx = (u - T(cx)) * (T(1) / T(fx));
     const T my = (v - T(cy)) * (T(1) / T(fy));
     const T s = T(1) / std::sqrt(mx * mx + my * my + T(1));
-    return {mx * s, my * s, s, pixelInRange(u, v)};
+    return {mx * s, my * s, s, anyOf(pixelInRange(u, v), DLSD_MUTANT("pinhole-any-pixel"))};
   }
 
   [[nodiscard]] ProjectionJacobian jacobian(double x, double y, double z) const {

@@ -6,6 +6,7 @@
 #include <type_traits>
 
 #include "cameras/camera_model.h"
+#include "cameras/mutant.h"
 #include "cameras/newton.h"
 #include "cameras/polynomial.h"
 
@@ -69,7 +70,8 @@ struct Radtan {
   template <class T>
   [[nodiscard, gnu::always_inline]] std::array<T, 2> distort(T x, T y) const {
     const T t = x * x + y * y;
-    const T factor = T(1) + t * (T(k1) + t * (T(k2) + t * T(k3))) + T(2) * (T(p2) * x + T(p1) * y);
+    const T factor = T(1) + t * (T(k1) + t * (T(k2) + t * T(k3))) +
+                     T(2) * (T(DLSD_MUTANT("radtan-tangential") ? p1 : p2) * x + T(p1) * y);
     return {x * factor + T(p2) * t, y * factor + T(p1) * t};
   }
 
@@ -204,7 +206,7 @@ struct Radtan {
     for (const double t : signChanges(inner, 0, radius * radius)) {
       if (evalPolynomial(skewed, std::sqrt(t)) < 0) radius = std::min(radius, std::sqrt(t));
     }
-    return radius;
+    return DLSD_MUTANT("radtan-domain") ? radius * (1 + 1e-6) : radius;
   }
 };
 

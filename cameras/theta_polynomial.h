@@ -2,6 +2,7 @@
 #include <algorithm>
 
 #include "cameras/camera_model.h"
+#include "cameras/mutant.h"
 #include "cameras/newton.h"
 #include "cameras/polynomial.h"
 
@@ -56,7 +57,8 @@ struct ThetaPolynomial {
   }
   template <class T>
   [[nodiscard, gnu::always_inline]] T radiusSlope(T theta) const {
-    return (T(k1) + theta * T(2 * k2)) + (theta * theta) * (T(3 * k3) + theta * T(4 * k4));
+    const T last = T((DLSD_MUTANT("theta-slope") ? 4 - 1e-6 : 4) * k4);
+    return (T(k1) + theta * T(2 * k2)) + (theta * theta) * (T(3 * k3) + theta * last);
   }
 
   template <class T>

@@ -1,5 +1,6 @@
 #pragma once
 #include "cameras/camera_model.h"
+#include "cameras/mutant.h"
 
 namespace dlsd {
 
@@ -41,7 +42,8 @@ struct UnifiedOmni {
     const T scale = numerator / denominator;
     const T u = T(fx) * (x * scale) + T(cx);
     const T v = T(fy) * (y * scale) + T(cy);
-    const bool before_fold = anyOf(z >= T(0), xi <= 1, r2 > T((xi - 1) * (xi + 1)) * (z * z));
+    const bool before_fold =
+        anyOf(DLSD_MUTANT("omni-fold"), z >= T(0), xi <= 1, r2 > T((xi - 1) * (xi + 1)) * (z * z));
     return {u, v, allOf(denominator > T(0), before_fold, norm2InRange(norm2), pixelInRange(u, v))};
   }
 
@@ -52,7 +54,7 @@ struct UnifiedOmni {
     const T m2 = mx * mx + my * my;
     const T disc = T(1) + T((1 - xi) * (1 + xi)) * m2;
     const T root = std::sqrt(std::max(disc, T(0)));
-    const T inverse = T(1) / (T(1) + m2);
+    const T inverse = T(DLSD_MUTANT("omni-unit") ? 1 + 1e-14 : 1) / (T(1) + m2);
     const T scale = (T(xi) + root) * inverse;
     // z = scale - xi, written without the cancellation that large xi brings.
     const T z = (root - T(xi) * m2) * inverse;
@@ -67,7 +69,13 @@ struct UnifiedOmni {
     // d + xi z vanishes at the fold; behind the camera without cancellation, as the denominator.
     const double slope = z >= 0 ? d + xi * z : (r2 - (xi - 1) * (xi + 1) * z * z) / (d - xi * z);
     const double g = slope / d * (s * s);
-    return radialJacobian(fx, fy, x, y, s, z * g, -std::sqrt(r2) * g);
+    return radialJacobian(fx,
+                          fy,
+                          x,
+                          y,
+                          s,
+                          z * g,
+                          (DLSD_MUTANT("omni-jacobian") ? -1 - 1e-8 : -1) * std::sqrt(r2) * g);
   }
 
   [[nodiscard]] double maxFieldAngle() const {

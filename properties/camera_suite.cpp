@@ -262,7 +262,7 @@ rc::Gen<Drawn> genDrawn(std::string_view model) {
 
 TEST_P(CameraSuite, PixelsInsideTheImageComeBack) {
   Worst worst("pixel -> ray -> pixel, px", kKinds);
-  Worst worst_fine("the same in admissible cameras, over 1e-10 px or the resolution of rays");
+  Worst unresolved("the same where rays do not resolve 5e-11 px, over their resolution", kKinds);
   long seen = 0, drawn = 0;
   holds([&] {
     const auto [camera, kind] = *genDrawn(GetParam());
@@ -279,23 +279,25 @@ TEST_P(CameraSuite, PixelsInsideTheImageComeBack) {
         RC_FAIL("no way back: " + describe(camera, pixel));
       }
       const double error = (*back - pixel).norm();
-      worst.see(error, kind);
       double allowed = kPixelRoundTrip;
-      if (kind == kAdmissible) {
-        // Some show so small a piece of the sphere that neighbouring rays of doubles are further
-        // apart, in pixels, than that.
+      if (kind == kAdmissible || std::holds_alternative<Ocam>(camera.model())) {
+        // Some show so small a piece of the sphere, or (OCam) fold it so, that neighbouring rays of
+        // doubles are further apart, in pixels, than that.
         const auto J = camera.jacobian(*ray);
         if (!J) continue;
-        allowed = std::max(
-            allowed,
-            8 * pixelUlp(camera, pixel) + singularValues(*J).largest * inverseResolution(camera));
-        worst_fine.see(error / allowed);
+        const double resolution = singularValues(*J).largest * inverseResolution(camera);
+        if (!(resolution <= kPixelRoundTrip / 2)) {
+          allowed = 8 * pixelUlp(camera, pixel) + resolution;
+          unresolved.see(error / allowed, kind);
+        }
       }
+      if (allowed == kPixelRoundTrip) worst.see(error, kind);
       if (!(error <= allowed)) RC_FAIL(describe(camera, pixel));
     }
   });
   EXPECT_GE(seen, drawn / 2);
-  EXPECT_GE(worst.count(), seen * 99 / 100);
+  EXPECT_GE(worst.count() + unresolved.count(), seen * 99 / 100);
+  EXPECT_GE(worst.count(), seen / 2);
 }
 
 TEST_P(CameraSuite, RaysComeBack) {
@@ -694,6 +696,7 @@ TEST_P(CameraSuite, TheImageOfAPlaneStaysOnItsArc) {
     const Camera camera = *genCamera(GetParam(), Range::kRealistic);
     for (int n = 0; n < 4; ++n) {
       const Arc arc = drawArc(camera);
+      RC_ASSERT(std::abs(arc.normal.norm() - 1) <= 4 * std::numeric_limits<double>::epsilon());
       for (const ImageSpan& span : imageSpans(camera, arc)) {
         const auto points = imageCurve(camera, arc, span.t0, span.t1);
         for (size_t k = 0; k < points.size(); ++k) {
