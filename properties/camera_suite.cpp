@@ -265,7 +265,9 @@ TEST_P(CameraSuite, PixelsInsideTheImageComeBack) {
   Worst unresolved("the same where rays do not resolve 5e-11 px, over their resolution", kKinds);
   long seen = 0, drawn = 0;
   holds([&] {
-    const auto [camera, kind] = *genDrawn(GetParam());
+    const Drawn from = *genDrawn(GetParam());
+    const Camera& camera = from.camera;
+    const Kind kind = from.kind;
     for (const Vector2d& pixel :
          many(rc::gen::oneOf(genPixelInImage(camera), genPixelOnBorder(camera)))) {
       ++drawn;
@@ -305,7 +307,9 @@ TEST_P(CameraSuite, RaysComeBack) {
   Worst worst_far("the same outside the image or in odd cameras, plus the resolution of a ray",
                   kKinds);
   const long cases = holds([&] {
-    const auto [camera, kind] = *genDrawn(GetParam());
+    const Drawn from = *genDrawn(GetParam());
+    const Camera& camera = from.camera;
+    const Kind kind = from.kind;
     for (const Vector3d& ray : many(genRayFor(camera))) {
       const auto pixel = camera.project(ray);
       if (!pixel) continue;
@@ -336,7 +340,8 @@ TEST_P(CameraSuite, RaysComeBack) {
 TEST_P(CameraSuite, ValidOneWayImpliesValidBack) {
   long rays = 0, pixels = 0;
   const long cases = holds([&] {
-    const auto [camera, kind] = *genDrawn(GetParam());
+    const Drawn from = *genDrawn(GetParam());
+    const Camera& camera = from.camera;
     for (const Vector3d& ray : many(genRayFor(camera))) {
       const auto pixel = camera.project(ray);
       if (!pixel) continue;
@@ -366,7 +371,8 @@ TEST_P(CameraSuite, ValidOneWayImpliesValidBack) {
 TEST_P(CameraSuite, RaysAreValidExactlyInsideTheDomain) {
   long inside = 0, outside = 0;
   const long cases = holds([&] {
-    const auto [camera, kind] = *genDrawn(GetParam());
+    const Drawn from = *genDrawn(GetParam());
+    const Camera& camera = from.camera;
     const CameraModelVariant& model = camera.model();
     const auto limit = static_cast<long double>(camera.maxFieldAngleLimit());
     const long double bound = std::min(oracleMaxFieldAngle(model), limit);
@@ -449,7 +455,9 @@ TEST_P(CameraSuite, ValidImpliesFiniteAndUnit) {
   Worst worst("| |ray| - 1 |, in ulp(1)", kKinds);
   long accepted = 0;
   const long cases = holds([&] {
-    const auto [camera, kind] = *genDrawn(GetParam());
+    const Drawn from = *genDrawn(GetParam());
+    const Camera& camera = from.camera;
+    const Kind kind = from.kind;
     const auto checkRay = [&](const Vector3d& ray) {
       const auto pixel = camera.project(ray);
       const auto J = camera.jacobian(ray);
@@ -499,7 +507,9 @@ TEST_P(CameraSuite, TheLengthOfARayDoesNotMatter) {
   Worst worst("difference, in units of 8 ulp(px) + 2 * largest singular value * ray resolution",
               kKinds);
   const long cases = holds([&] {
-    const auto [camera, kind] = *genDrawn(GetParam());
+    const Drawn from = *genDrawn(GetParam());
+    const Camera& camera = from.camera;
+    const Kind kind = from.kind;
     const double scale = *genLogReal(1e-95, 1e95);
     for (const Vector3d& ray : many(genRayFor(camera))) {
       const auto a = camera.project(ray), b = camera.project(scale * ray);
@@ -525,7 +535,9 @@ TEST_P(CameraSuite, AgreesWithTheTextbookInLongDouble) {
   Worst worst("difference, in units of 8 ulp(px) + largest singular value * ray resolution",
               kKinds);
   const long cases = holds([&] {
-    const auto [camera, kind] = *genDrawn(GetParam());
+    const Drawn from = *genDrawn(GetParam());
+    const Camera& camera = from.camera;
+    const Kind kind = from.kind;
     const CameraModelVariant& model = camera.model();
     for (const Vector3d& ray : many(genRayFor(camera))) {
       const auto pixel = camera.project(ray);
@@ -546,7 +558,9 @@ TEST_P(CameraSuite, TheJacobianIsTheDerivative) {
   Worst worst("against automatic differentiation, in what is allowed", kKinds);
   Worst euler("|J ray| / |J|, in ulp(1)", kKinds);
   const long cases = holds([&] {
-    const auto [camera, kind] = *genDrawn(GetParam());
+    const Drawn from = *genDrawn(GetParam());
+    const Camera& camera = from.camera;
+    const Kind kind = from.kind;
     const auto bound = static_cast<double>(oracleMaxFieldAngle(camera.model()));
     for (const Vector3d& ray : many(genRayFor(camera))) {
       const auto J = camera.jacobian(ray);
@@ -576,7 +590,9 @@ TEST_P(CameraSuite, TheJacobianIsTheDerivative) {
 TEST_P(CameraSuite, TheImageIsContinuousAcrossTheAxis) {
   Worst worst("deviation from J * offset, in units of 4 ulp(px)", kKinds);
   const long cases = holds([&] {
-    const auto [camera, kind] = *genDrawn(GetParam());
+    const Drawn from = *genDrawn(GetParam());
+    const Camera& camera = from.camera;
+    const Kind kind = from.kind;
     const Vector2d centre = principalPoint(camera);
     const auto axis = camera.project({0, 0, 1});
     RC_ASSERT(axis.has_value());
@@ -614,7 +630,8 @@ TEST_P(CameraSuite, TheImageIsContinuousAcrossTheAxis) {
 TEST_P(CameraSuite, BatchesEqualSinglePoints) {
   long compared = 0;
   const long cases = holds([&] {
-    const auto [camera, kind] = *genDrawn(GetParam());
+    const Drawn from = *genDrawn(GetParam());
+    const Camera& camera = from.camera;
     const size_t n = *rc::gen::elementOf(std::vector<size_t>{0, 1, 2, 3, 4, 5, 7, 8, 9, 31, 64});
     const auto rays = draw(n, genRayFor(camera));
     const auto pixels = draw(n, genPixelFor(camera));
