@@ -18,6 +18,39 @@ constexpr int kCentreTap = 7;
 constexpr double kTaperFrom = 3;
 /// The largest tap. Sums over 16 taps of 12-bit pixels stay below 2^31.
 constexpr double kKernelMax = 30000;
+/// The same of matched filters, which serve edges that stand alone.
+constexpr double kMatchedTaperFrom = 5;
+
+double taper(double t, double from) {
+  const double beyond = std::clamp((std::abs(t) - from) / (kCentreTap - from), 0.0, 1.0);
+  return 0.5 * (1 + std::cos(M_PI * beyond));
+}
+
+/// Integration over the taps, fine against every blur.
+constexpr int kIntegrationSteps = 64;
+
+/// Response of an odd filter to a step of one grey level through a blur.
+template <class Filter>
+double oddStep(const Filter& odd, double variance) {
+  double sum = 0;
+  for (int i = -kCentreTap * kIntegrationSteps; i <= kCentreTap * kIntegrationSteps; ++i) {
+    const double t = static_cast<double>(i) / kIntegrationSteps;
+    sum += odd(t) * 0.5 * std::erfc(-t / std::sqrt(2 * variance)) / kIntegrationSteps;
+  }
+  return sum;
+}
+
+/// Change of an even filter's response to the same with the step's position.
+template <class Filter>
+double evenSlope(const Filter& even, double variance) {
+  double sum = 0;
+  for (int i = -kCentreTap * kIntegrationSteps; i <= kCentreTap * kIntegrationSteps; ++i) {
+    const double t = static_cast<double>(i) / kIntegrationSteps;
+    sum -= even(t) * std::exp(-0.5 * t * t / variance) / std::sqrt(2 * M_PI * variance) /
+           kIntegrationSteps;
+  }
+  return sum;
+}
 
 template <class T>
 void rowSumsPortable(const T* pixels, const EdgeProfiler::Kernels& kernels, int32_t* sums) {
@@ -59,6 +92,25 @@ DLSD_AVX2 void rowSums16Avx2(const uint16_t* pixels,
 }
 #endif
 
+/// Ratio of the variances of neighbouring blurs in the tables, and its logarithm.
+constexpr double kShapeStep = 1.2, kLogShapeStep = 0.1823215567939546;
+double shapeVariance(size_t i) {
+  return EdgeProfiler::kLeastVariance * std::pow(kShapeStep, static_cast<double>(i));
+}
+
+/// Taps of a filter whose middle is phase / kPhases behind the centre tap.
+template <class Filter>
+void setTaps(const Filter& filter, size_t phase, int16_t* taps) {
+  int sum = 0;
+  for (int i = 0; i < kTaps; ++i) {
+    const double t = i - kCentreTap - static_cast<double>(phase) / EdgeProfiler::kPhases;
+    taps[i] = static_cast<int16_t>(std::lround(filter(t)));
+    sum += taps[i];
+  }
+  // No response at all to a constant grey level.
+  taps[kCentreTap] = static_cast<int16_t>(taps[kCentreTap] - sum);
+}
+
 }  // namespace
 
 EdgeProfiler::EdgeProfiler() : row_sums_8_(rowSumsPortable), row_sums_16_(rowSumsPortable) {
@@ -69,67 +121,120 @@ EdgeProfiler::EdgeProfiler() : row_sums_8_(rowSumsPortable), row_sums_16_(rowSum
   }
 #endif
   const double sigmas[2] = {kNarrowPx, kWidePx};
+  constexpr int kFine = static_cast<int>(kPhases);
+  // Responses to a step of one grey level through each blur, of the even ones their change with the
+  // step's position.
+  std::array<std::array<double, kShapes>, 4> steps{};
   for (size_t width = 0; width < 2; ++width) {
     const double s2 = sigmas[width] * sigmas[width];
     // A window that is 0 beyond the taps at every phase, and the constant that leaves the second
     // derivative without a mean.
-    const auto bell = [&](double t) {
-      const double beyond =
-          std::clamp((std::abs(t) - kTaperFrom) / (kCentreTap - kTaperFrom), 0.0, 1.0);
-      return std::exp(-0.5 * t * t / s2) * 0.5 * (1 + std::cos(M_PI * beyond));
-    };
+    const auto bell = [&](double t) { return std::exp(-0.5 * t * t / s2) * taper(t, kTaperFrom); };
     double sum = 0, sum_squares = 0;
-    for (int i = -kCentreTap * kPhases; i <= kCentreTap * kPhases; ++i) {
-      const double t = static_cast<double>(i) / kPhases;
+    for (int i = -kCentreTap * kFine; i <= kCentreTap * kFine; ++i) {
+      const double t = static_cast<double>(i) / kFine;
       sum += bell(t);
       sum_squares += bell(t) * t * t / s2;
     }
     // Largest value of t exp(-t^2 / 2s^2): s / sqrt(e).
     const double odd_scale = kKernelMax / (sigmas[width] * std::exp(-0.5));
-    // Responses to a step of one grey level, of the second derivative by its change with the
-    // step's position, and to shading of one grey level per px.
-    double odd_step = 0, even_step = 0, odd_ramp = 0;
-    for (int i = -kCentreTap * kPhases; i <= kCentreTap * kPhases; ++i) {
-      const double t = static_cast<double>(i) / kPhases;
-      const double odd = odd_scale * t * bell(t);
-      const double even = -kKernelMax * (sum_squares / sum - t * t / s2) * bell(t);
-      odd_step += odd * 0.5 * std::erfc(-t / std::sqrt(2 * kBlurVariance)) / kPhases;
-      even_step -= even * std::exp(-0.5 * t * t / kBlurVariance) /
-                   std::sqrt(2 * M_PI * kBlurVariance) / kPhases;
-      odd_ramp += odd * t / kPhases;
+    const auto odd = [&](double t) { return odd_scale * t * bell(t); };
+    const auto even = [&](double t) {
+      return -kKernelMax * (sum_squares / sum - t * t / s2) * bell(t);
+    };
+    const double odd_step = oddStep(odd, kBlurVariance), even_step = evenSlope(even, kBlurVariance);
+    double odd_ramp = 0;
+    for (int i = -kCentreTap * kFine; i <= kCentreTap * kFine; ++i) {
+      const double t = static_cast<double>(i) / kFine;
+      odd_ramp += odd(t) * t / kFine;
     }
     scale_[2 * width] = static_cast<float>(1 / odd_step);
     scale_[2 * width + 1] = static_cast<float>(1 / even_step);
     (width == 0 ? ramp_.odd_narrow : ramp_.odd_wide) = static_cast<float>(odd_ramp / odd_step);
-    for (int phase = 0; phase < kPhases; ++phase) {
-      auto& odd = kernels_[static_cast<size_t>(phase)].taps[2 * width];
-      auto& even = kernels_[static_cast<size_t>(phase)].taps[2 * width + 1];
-      int odd_sum = 0, even_sum = 0;
-      for (int i = 0; i < kTaps; ++i) {
-        const double t = i - kCentreTap - static_cast<double>(phase) / kPhases;
-        odd[i] = static_cast<int16_t>(std::lround(odd_scale * t * bell(t)));
-        even[i] = static_cast<int16_t>(
-            std::lround(-kKernelMax * (sum_squares / sum - t * t / s2) * bell(t)));
-        odd_sum += odd[i];
-        even_sum += even[i];
-      }
-      // No response at all to a constant grey level.
-      odd[kCentreTap] = static_cast<int16_t>(odd[kCentreTap] - odd_sum);
-      even[kCentreTap] = static_cast<int16_t>(even[kCentreTap] - even_sum);
+    for (size_t i = 0; i < kShapes; ++i) {
+      steps[2 * width][i] = oddStep(odd, shapeVariance(i)) / odd_step;
+      steps[2 * width + 1][i] = evenSlope(even, shapeVariance(i)) / even_step;
+    }
+    for (size_t phase = 0; phase < kPhases; ++phase) {
+      setTaps(odd, phase, banks_[0][phase].taps[2 * width]);
+      setTaps(even, phase, banks_[0][phase].taps[2 * width + 1]);
     }
   }
-  const auto norm = [&](size_t k) {
-    float sum = 0;
-    for (const int16_t tap : kernels_[0].taps[k])
-      sum += static_cast<float>(tap) * static_cast<float>(tap);
-    return std::sqrt(sum) * scale_[k];
+  const auto norm = [&](const int16_t* taps) {
+    double sum = 0;
+    for (int i = 0; i < kTaps; ++i) sum += static_cast<double>(taps[i]) * taps[i];
+    return static_cast<float>(std::sqrt(sum));
   };
-  white_noise_ = {norm(0), norm(1), norm(2), norm(3)};
+  const Kernels& first = banks_[0][0];
+  white_noise_ = {norm(first.taps[0]) * scale_[0],
+                  norm(first.taps[1]) * scale_[1],
+                  norm(first.taps[2]) * scale_[2],
+                  norm(first.taps[3]) * scale_[3]};
+  for (size_t i = 0; i < kShapes; ++i) {
+    ratio_[i] = static_cast<float>(steps[0][i] / steps[2][i]);
+    narrow_gain_[i] = static_cast<float>(steps[0][i] / steps[1][i]);
+  }
+  for (size_t k = 0; k < kMatchedVariances.size(); ++k) {
+    const double variance = kMatchedVariances[k];
+    const auto bell = [&](double t) {
+      return std::exp(-0.5 * t * t / variance) * taper(t, kMatchedTaperFrom);
+    };
+    double sum = 0, window = 0;
+    for (int i = -kCentreTap * kFine; i <= kCentreTap * kFine; ++i) {
+      const double t = static_cast<double>(i) / kFine;
+      sum += bell(t);
+      window += taper(t, kMatchedTaperFrom);
+    }
+    const auto matched = [&](double t) {
+      return kKernelMax * (sum / window * taper(t, kMatchedTaperFrom) - bell(t));
+    };
+    banks_[1 + k] = banks_[0];
+    for (size_t phase = 0; phase < kPhases; ++phase) {
+      setTaps(matched, phase, banks_[1 + k][phase].taps[3]);
+    }
+    // In the units of the wide even filter.
+    matched_noise_[k] = norm(banks_[1 + k][0].taps[3]) * scale_[3];
+    for (size_t i = 0; i < kShapes; ++i) {
+      const double slope = evenSlope(matched, shapeVariance(i)) * static_cast<double>(scale_[3]);
+      matched_gain_[k][i] = static_cast<float>(steps[2][i] / slope);
+    }
+    matched_slope_[k] = 1 / gain(variance, variance).matched;
+  }
+}
+
+size_t EdgeProfiler::matchedFor(double blur_variance) {
+  size_t k = 0;
+  while (k + 1 < kMatchedVariances.size() &&
+         blur_variance * blur_variance > kMatchedVariances[k] * kMatchedVariances[k + 1]) {
+    ++k;
+  }
+  return k;
+}
+
+double EdgeProfiler::blurVariance(double narrow_over_wide) const {
+  const auto ratio = static_cast<float>(narrow_over_wide);
+  size_t i = 0;
+  while (i + 2 < kShapes && ratio_[i + 1] > ratio) ++i;
+  const float t = std::clamp((ratio_[i] - ratio) / (ratio_[i] - ratio_[i + 1]), 0.0F, 1.0F);
+  return shapeVariance(i) * std::pow(kShapeStep, static_cast<double>(t));
+}
+
+StepGain EdgeProfiler::gain(double blur_variance, double matched_variance) const {
+  const double at =
+      std::log(std::clamp(blur_variance, kLeastVariance, kMostVariance) / kLeastVariance) /
+      kLogShapeStep;
+  const size_t i = std::min(static_cast<size_t>(at), kShapes - 2);
+  const auto t = static_cast<float>(at - static_cast<double>(i));
+  const auto between = [&](const std::array<float, kShapes>& table) {
+    return table[i] + t * (table[i + 1] - table[i]);
+  };
+  return {between(narrow_gain_), between(matched_gain_[matchedFor(matched_variance)])};
 }
 
 template <class T>
 void EdgeProfiler::measureTyped(const T* data,
                                 const EdgeWindow& window,
+                                const std::array<Kernels, kPhases>& kernels,
                                 std::array<std::array<int32_t, 4>, kRows>* sums) const {
   const int rows = window.crosses_rows ? pixels_.height : pixels_.width;
   const int columns = window.crosses_rows ? pixels_.width : pixels_.height;
@@ -146,7 +251,7 @@ void EdgeProfiler::measureTyped(const T* data,
     const int position = static_cast<int>(std::floor((first + i * window.slope) * kPhases + 0.5));
     const int base = position >> 6;
     static_assert(kPhases == 1 << 6);
-    phases[k] = static_cast<size_t>(position & (kPhases - 1));
+    phases[k] = static_cast<size_t>(position & (static_cast<int>(kPhases) - 1));
     const int begin = base - kCentreTap;
     const T* line = data + row * row_stride;
     if (begin >= 0 && begin + kTaps <= columns) {
@@ -170,24 +275,26 @@ void EdgeProfiler::measureTyped(const T* data,
     if (from[k] == nullptr) {
       (*sums)[k] = {};
     } else if constexpr (sizeof(T) == 1) {
-      row_sums_8_(from[k], kernels_[phases[k]], (*sums)[k].data());
+      row_sums_8_(from[k], kernels[phases[k]], (*sums)[k].data());
     } else {
-      row_sums_16_(from[k], kernels_[phases[k]], (*sums)[k].data());
+      row_sums_16_(from[k], kernels[phases[k]], (*sums)[k].data());
     }
   }
 }
 
 void EdgeProfiler::measure(const EdgeWindow& window,
+                           size_t bank,
                            std::array<EdgeResponse, kRows>* responses) const {
   std::array<std::array<int32_t, 4>, kRows> sums;
   float unit = 1;
   if (pixels_.u8 != nullptr) {
-    measureTyped(pixels_.u8, window, &sums);
+    measureTyped(pixels_.u8, window, banks_[bank], &sums);
   } else {
-    measureTyped(pixels_.fixed, window, &sums);
+    measureTyped(pixels_.fixed, window, banks_[bank], &sums);
     unit = 1.0F / kGreyUnit;
   }
   // The positions were rounded to the filters' phases: moved back, to first order.
+  const float slope = bank == 0 ? 1 : matched_slope_[bank - 1];
   const double first = window.across - 3.5 * window.slope;
   for (int i = 0; i < kRows; ++i) {
     const auto& s = sums[static_cast<size_t>(i)];
@@ -199,7 +306,7 @@ void EdgeProfiler::measure(const EdgeWindow& window,
     const double exact = (first + i * window.slope) * kPhases;
     const auto rounding = static_cast<float>((std::floor(exact + 0.5) - exact) * (1.0 / kPhases));
     r.even_narrow += rounding * r.odd_narrow;
-    r.even_wide += rounding * r.odd_wide;
+    r.even_wide += rounding * slope * r.odd_wide;
   }
 }
 

@@ -17,9 +17,12 @@ constexpr float kMaxTangent = 0.325F;
 /// the edge stands alone: its neighbours would be seen, too.
 constexpr double kMaxNarrowSigmaPx = 0.2;
 constexpr double kAloneRatio[2] = {0.85, 1.25};
-/// Narrow over wide response from which an edge is sharper than EdgeProfiler::kBlurVariance: 1.16
-/// for one without any blur but the pixel's, whose offsets seem 1 / kLeastGain as large.
-constexpr double kSharpRatio = 1.05, kLeastGain = 0.64;
+/// Narrow over wide response from which an edge is sharper than EdgeProfiler::kBlurVariance.
+constexpr double kSharpRatio = 1.05;
+/// Blur of edges whose own can't be measured, across them: optics of 0.7 px and the pixel.
+constexpr double kUsualVariance = 0.7 * 0.7 + 1.0 / 12;
+/// What a filter of fixed shape leaves of an edge of another blur, and of its neighbours.
+constexpr float kModelVariance = 0.03F * 0.03F;
 /// Wide over narrow response: 1 for a step, 1.2 for one of blur 1.5 px, 1.3 for two alike that are
 /// 3 px apart, 1.7 for shading that rises evenly.
 constexpr float kMaxWideRatio = 1.45F;
@@ -216,8 +219,6 @@ void LineTracer::judge(Quad* quad) const {
                   std::abs(quad->mean.odd_wide) <=
                       kMaxWideRatio * std::abs(quad->mean.odd_narrow) + 2 * noise_.odd_wide;
   quad->offset_px = quad->is_edge ? (wide_ ? 1 : offset_gain_) * even / odd : 0;
-  // What a filter of fixed shape leaves of an edge of another blur, and of its neighbours.
-  constexpr float kModelVariance = 0.03F * 0.03F;
   quad->variance_px2 = quad->is_edge ? noise * noise / (odd * odd) + kModelVariance : 0;
 }
 
@@ -429,6 +430,179 @@ LineTracer::End LineTracer::endOf(size_t first, size_t last, bool at_border) con
   return end;
 }
 
+/// Measures the quads again where the curve is now, with matched filters.
+void LineTracer::measureAgain(double row_variance) {
+  std::array<EdgeResponse, EdgeProfiler::kRows> rows;
+  struct Place {
+    RaySample sample;
+    double across = 0, slope = 0;
+    int first_row = 0;
+  };
+  const auto placeOf = [&](Quad* q) -> std::optional<Place> {
+    Place place;
+    const int a = q->crosses_rows ? 0 : 1;
+    Eigen::Vector2d at(static_cast<double>(q->x), static_cast<double>(q->y));
+    for (int iteration = 0; iteration < 2; ++iteration) {
+      const double u = std::clamp(at.x(), 0.0, pixels_.width - 1.0);
+      const double v = std::clamp(at.y(), 0.0, pixels_.height - 1.0);
+      if (!rays_.covers(u, v)) return std::nullopt;
+      place.sample = rays_.at(u, v);
+      const Eigen::Vector2d g(place.sample.du.dot(normal_), place.sample.dv.dot(normal_));
+      if (!(std::abs(g[a]) * 4 > std::abs(g[1 - a]))) return std::nullopt;
+      const double f = place.sample.ray.dot(normal_) + (at.x() - u) * g.x() + (at.y() - v) * g.y();
+      const double step = -f / g[a];
+      if (!(std::abs(step) < 2)) return std::nullopt;
+      place.sample.ray += (at.x() - u) * place.sample.du + (at.y() - v) * place.sample.dv +
+                          step * (a == 0 ? place.sample.du : place.sample.dv);
+      at[a] += step;
+      place.slope = -g[1 - a] / g[a];
+      if (std::abs(step) < 0.02) break;
+    }
+    place.across = at[a];
+    place.first_row = static_cast<int>(std::lround(at[1 - a] - 1.5));
+    q->ray = projected(place.sample.ray, normal_);
+    q->across = a == 0 ? place.sample.du : place.sample.dv;
+    q->x = static_cast<float>(at.x());
+    q->y = static_cast<float>(at.y());
+    q->slope = static_cast<float>(place.slope);
+    q->perpendicular = static_cast<float>(1 / std::sqrt(1 + place.slope * place.slope));
+    return place;
+  };
+  const auto take = [&](size_t first, Quad* q) {
+    EdgeResponse mean{};
+    for (size_t k = first; k < first + kQuadPx; ++k) {
+      mean.odd_narrow += rows[k].odd_narrow / kQuadPx;
+      mean.even_narrow += rows[k].even_narrow / kQuadPx;
+      mean.odd_wide += rows[k].odd_wide / kQuadPx;
+      mean.even_wide += rows[k].even_wide / kQuadPx;
+    }
+    q->mean = mean;
+  };
+  for (size_t i = 0; i < quads_.size();) {
+    Quad& one = quads_[i];
+    const auto place = placeOf(&one);
+    if (!place) {
+      one.is_edge = false;
+      ++i;
+      continue;
+    }
+    // Two that follow each other are measured together.
+    Quad* other = i + 1 < quads_.size() ? &quads_[i + 1] : nullptr;
+    if (other != nullptr && other->crosses_rows != one.crosses_rows) other = nullptr;
+    std::optional<Place> next;
+    if (other != nullptr) next = placeOf(other);
+    if (next && std::abs(next->first_row - place->first_row) != kQuadPx) next.reset();
+    double bend = 0;
+    EdgeWindow window{one.crosses_rows, place->first_row, 0, place->slope};
+    const bool downwards = next && next->first_row < place->first_row;
+    if (next) {
+      const double way = downwards ? -1 : 1;
+      window.slope = way * (next->across - place->across) / kQuadPx;
+      bend = way * (next->slope - place->slope) / kQuadPx;
+      window.first_row = std::min(place->first_row, next->first_row);
+      window.across = (place->across + next->across) / 2;
+    } else {
+      window.across = place->across + 2 * place->slope;
+    }
+    // The mean of a parabola over four rows.
+    constexpr double kMeanSquare = 1.25;
+    window.across += 0.5 * bend * kMeanSquare;
+    profiler_.measureMatched(window, row_variance, &rows);
+    take(downwards ? 4 : 0, &one);
+    ++i;
+    if (next) {
+      take(downwards ? 0 : 4, other);
+      ++i;
+    }
+  }
+}
+
+/// The last fit: every quad once more at the curve as known by now, with the gain that belongs to
+/// the edge's own blur. Where the edge stands alone, with filters matched to it.
+void LineTracer::refine() {
+  double narrow = 0, wide = 0, stretch = 0;
+  int count = 0;
+  for (const Quad& q : quads_) {
+    if (!q.is_edge) continue;
+    narrow += std::abs(static_cast<double>(q.mean.odd_narrow));
+    wide += std::abs(static_cast<double>(q.mean.odd_wide));
+    stretch += 1 / static_cast<double>(q.perpendicular * q.perpendicular);
+    ++count;
+  }
+  if (count < 2) return;
+  stretch /= count;
+  // The blur along rows is that across the edge, stretched.
+  const double tolerance = 3 * static_cast<double>(noise_.odd_narrow) * std::sqrt(count);
+  bool alone = narrow <= profiler_.sharpestRatio() * wide + tolerance &&
+               narrow >= profiler_.softestRatio() * wide - tolerance;
+  const double row_variance =
+      alone ? profiler_.blurVariance(narrow / wide) : kUsualVariance * stretch;
+  measureAgain(row_variance);
+
+  const EdgeResponse& white = profiler_.whiteNoise();
+  const float matched_noise =
+      profiler_.matchedWhiteNoise(row_variance) * noise_.odd_wide / white.odd_wide;
+  struct Sums {
+    double w = 0, t = 0, tt = 0, d = 0, td = 0;
+  } sums;
+  size_t index = 0;
+  int differing = 0;
+  constexpr float kModelDifference = 0.02F;
+  const auto half = 0.5 * static_cast<double>(quads_.size() - 1);
+  const auto matchedOffset = [&](const Quad& q, const StepGain& gain) {
+    return gain.matched * q.mean.even_wide / q.mean.odd_wide;
+  };
+  const auto gainOf = [&](const Quad& q) {
+    const double p = static_cast<double>(q.perpendicular);
+    return profiler_.gain(row_variance / stretch / (p * p), row_variance);
+  };
+  const auto sigmaOf = [](float gain, float noise, float level) {
+    return gain * noise / std::abs(level);
+  };
+  for (Quad& q : quads_) {
+    const double t = static_cast<double>(index++) / half - 1;
+    if (!q.is_edge) continue;
+    const StepGain gain = gainOf(q);
+    q.offset_px = gain.narrow * q.mean.even_narrow / q.mean.odd_narrow;
+    const float sigma = sigmaOf(gain.narrow, noise_.even_narrow, q.mean.odd_narrow);
+    q.variance_px2 = sigma * sigma + kModelVariance;
+    q.is_edge =
+        std::abs(q.offset_px) * q.perpendicular <= bound_px_ && std::isfinite(q.variance_px2);
+    if (!q.is_edge || !alone) continue;
+    const float matched_sigma = sigmaOf(gain.matched, matched_noise, q.mean.odd_wide);
+    const float variance = std::max(0.0F, sigma * sigma - matched_sigma * matched_sigma) +
+                           kModelDifference * kModelDifference;
+    const float difference = matchedOffset(q, gain) - q.offset_px;
+    differing += difference * difference > 9 * variance;
+    const double w = 1 / static_cast<double>(variance), d = static_cast<double>(difference);
+    sums.w += w;
+    sums.t += w * t;
+    sums.tt += w * t * t;
+    sums.d += w * d;
+    sums.td += w * t * d;
+  }
+  if (!alone || !(sums.w > 0)) return;
+  // Neighbours move what the wider filter sees, as a whole or more and more along the line.
+  constexpr double kSigmas2 = 9;
+  const double trend2 = sums.tt - sums.t * sums.t / sums.w;
+  const double trend = sums.td - sums.t * sums.d / sums.w;
+  if (sums.d * sums.d > kSigmas2 * sums.w || trend * trend > kSigmas2 * trend2 ||
+      10 * differing > count) {
+    return;
+  }
+  for (Quad& q : quads_) {
+    if (!q.is_edge) continue;
+    const StepGain gain = gainOf(q);
+    const float offset = matchedOffset(q, gain);
+    const float sigma = sigmaOf(gain.matched, matched_noise, q.mean.odd_wide);
+    const float variance = sigma * sigma + kModelVariance;
+    const float difference = offset - q.offset_px;
+    if (difference * difference > 9 * q.variance_px2 || !(variance < q.variance_px2)) continue;
+    q.offset_px = offset;
+    q.variance_px2 = variance;
+  }
+}
+
 std::optional<TracedLine> LineTracer::trace(const PlanarPiece& piece,
                                             const std::vector<Eigen::Vector2f>& nodes) {
   normal_ = piece.normal;
@@ -471,8 +645,8 @@ std::optional<TracedLine> LineTracer::trace(const PlanarPiece& piece,
     if (points_ < 2 || !refit()) return std::nullopt;
     if (level <= kSharpRatio * wide_level) break;
     // Sharper than the filters expect: offsets are smaller than they seem.
-    const double gain = wide_level * wide_level / (level * level);
-    offset_gain_ = static_cast<float>(std::max(gain, kLeastGain));
+    const double variance = profiler_.blurVariance(level / wide_level);
+    offset_gain_ = profiler_.gain(variance, variance).narrow;
   }
   const double tolerance = 2 * static_cast<double>(noise_.odd_narrow) * std::sqrt(points_);
   const bool stands_alone = wide_level >= kAloneRatio[0] * level - tolerance &&
@@ -521,7 +695,19 @@ std::optional<TracedLine> LineTracer::trace(const PlanarPiece& piece,
   std::reverse(quads_.begin(), quads_.end());
   if (quads_.size() < 3) return std::nullopt;
 
-  // Near its ends an edge meets others, which move it: a line that has enough points does without.
+  double narrow = 0, wide = 0;
+  for (const Quad& q : quads_) {
+    narrow += std::abs(static_cast<double>(q.mean.odd_narrow));
+    wide += std::abs(static_cast<double>(q.mean.odd_wide));
+  }
+  if (!(wide <= static_cast<double>(kMaxWideRatio) * narrow)) return std::nullopt;
+  TracedLine line;
+  line.score = scoreOf();
+  if (!(line.score >= options_.min_score)) return std::nullopt;
+  refine();
+
+  // Near its ends an edge meets others, which move it: a line that has enough points is fitted
+  // without, and then again with what agrees.
   constexpr size_t kEnoughQuads = 7;
   const size_t last = quads_.size() - 1;
   size_t begin = 0, end = quads_.size();
@@ -533,11 +719,25 @@ std::optional<TracedLine> LineTracer::trace(const PlanarPiece& piece,
   points_ = 0;
   for (size_t i = begin; i < end; ++i) add(quads_[i]);
   if (points_ < 2) return std::nullopt;
-  const auto fit = fitPlane(moments_);
+  auto fit = fitPlane(moments_);
+  if (!fit) return std::nullopt;
+  const auto agrees = [&](const Quad& q, bool is_whole) {
+    const Eigen::Vector3d ray = q.ray + static_cast<double>(q.offset_px) * q.across;
+    const double across_px = ray.dot(fit->normal) / q.across.dot(fit->normal);
+    return q.is_edge && is_whole &&
+           across_px * across_px <= 4 * static_cast<double>(q.variance_px2);
+  };
+  const int points = points_;
+  while (begin > 0 && agrees(quads_[begin - 1], begin > 1 || rowsOfEnd(last, 0) == kQuadPx)) {
+    add(quads_[--begin]);
+  }
+  while (end <= last && agrees(quads_[end], end < last || rowsOfEnd(0, last) == kQuadPx)) {
+    add(quads_[end++]);
+  }
+  if (points_ > points) fit = fitPlane(moments_);
   if (!fit) return std::nullopt;
   normal_ = normal_.dot(fit->normal) < 0 ? Eigen::Vector3d(-fit->normal) : fit->normal;
 
-  TracedLine line;
   line.fit = *fit;
   double sum2 = 0, chi2 = 0, side = 0;
   line.max_px = 0;
@@ -562,15 +762,8 @@ std::optional<TracedLine> LineTracer::trace(const PlanarPiece& piece,
   // Few residuals say little: the measured noise counts as kPriorPoints of them.
   constexpr double kPriorPoints = 4;
   line.variance_factor = (chi2 + kPriorPoints) / (points_ - 2 + kPriorPoints);
-  double narrow = 0, wide = 0;
-  for (const Quad& q : quads_) {
-    narrow += std::abs(static_cast<double>(q.mean.odd_narrow));
-    wide += std::abs(static_cast<double>(q.mean.odd_wide));
-  }
-  if (!(wide <= static_cast<double>(kMaxWideRatio) * narrow)) return std::nullopt;
   line.is_arc = options_.min_bend_radius_px > 0 && isArc(fit->normal);
   line.polarity = side < 0 ? -1 : 1;
-  line.score = scoreOf();
   const End from = endOf(last, 0, back.at_border);
   const End to = endOf(0, last, front.at_border);
   // Each part of the curve is near a usable pixel.

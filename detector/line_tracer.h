@@ -100,6 +100,8 @@ class LineTracer {
   void add(const Quad& quad);
   void extend(int direction, std::vector<Quad>* quads, Front* front);
   bool refit();
+  void measureAgain(double row_variance);
+  void refine();
   [[nodiscard]] bool isArc(const Eigen::Vector3d& normal) const;
   [[nodiscard]] double scoreOf() const;
   [[nodiscard]] int rowsOfEnd(size_t first, size_t last) const;

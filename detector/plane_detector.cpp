@@ -88,7 +88,6 @@ void PlaneDetector::claim() {
 }
 
 void PlaneDetector::traceAll(std::vector<DetectedLine>* lines) {
-  const ValidationOptions& v = options_.validation;
   order_.resize(pieces_.size());
   for (size_t i = 0; i < pieces_.size(); ++i) order_[i] = static_cast<uint32_t>(i);
   std::sort(order_.begin(), order_.end(), [&](uint32_t a, uint32_t b) {
@@ -100,7 +99,7 @@ void PlaneDetector::traceAll(std::vector<DetectedLine>* lines) {
     const PlanarPiece& piece = pieces_[index];
     if (isClaimed(piece)) continue;
     const auto traced = tracer_.trace(piece, splitter_.nodes());
-    if (!traced || traced->score < v.min_score || traced->is_arc || mostlyClaimed()) continue;
+    if (!traced || traced->is_arc || mostlyClaimed()) continue;
     const auto arc = visibleArc(rays_.camera(),
                                 traced->fit.normal,
                                 traced->from_ray,
