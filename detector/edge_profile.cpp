@@ -18,8 +18,8 @@ constexpr int kCentreTap = 7;
 constexpr double kTaperFrom = 3;
 /// The largest tap. Sums over 16 taps of 12-bit pixels stay below 2^31.
 constexpr double kKernelMax = 30000;
-/// The same of matched filters, which serve edges that stand alone.
-constexpr double kMatchedTaperFrom = 5;
+/// The same of the wide even filter.
+constexpr double kWideEvenTaperFrom = 4;
 
 double taper(double t, double from) {
   const double beyond = std::clamp((std::abs(t) - from) / (kCentreTap - from), 0.0, 1.0);
@@ -127,21 +127,29 @@ EdgeProfiler::EdgeProfiler() : row_sums_8_(rowSumsPortable), row_sums_16_(rowSum
   std::array<std::array<double, kShapes>, 4> steps{};
   for (size_t width = 0; width < 2; ++width) {
     const double s2 = sigmas[width] * sigmas[width];
-    // A window that is 0 beyond the taps at every phase, and the constant that leaves the second
-    // derivative without a mean.
+    // A window that is 0 beyond the taps at every phase, and what leaves the even filter without a
+    // mean: the constant of the second derivative, or the window.
     const auto bell = [&](double t) { return std::exp(-0.5 * t * t / s2) * taper(t, kTaperFrom); };
-    double sum = 0, sum_squares = 0;
+    const auto evenBell = [&](double t) {
+      return width == 0 ? bell(t)
+                        : std::exp(-0.5 * t * t / kWideEvenVariance) * taper(t, kWideEvenTaperFrom);
+    };
+    const auto without = [&](double t) {
+      return width == 0 ? bell(t) * t * t / s2 : taper(t, kWideEvenTaperFrom);
+    };
+    double sum = 0, sum_without = 0;
     for (int i = -kCentreTap * kFine; i <= kCentreTap * kFine; ++i) {
       const double t = static_cast<double>(i) / kFine;
-      sum += bell(t);
-      sum_squares += bell(t) * t * t / s2;
+      sum += evenBell(t);
+      sum_without += without(t);
     }
     // Largest value of t exp(-t^2 / 2s^2): s / sqrt(e).
     const double odd_scale = kKernelMax / (sigmas[width] * std::exp(-0.5));
     const auto odd = [&](double t) { return odd_scale * t * bell(t); };
-    const auto even = [&](double t) {
-      return -kKernelMax * (sum_squares / sum - t * t / s2) * bell(t);
-    };
+    const double share = sum / sum_without;
+    // The narrow one the other way round: 1 is its largest value, too.
+    const double even_scale = kKernelMax / (width == 0 ? share : 1 - share);
+    const auto even = [&](double t) { return even_scale * (share * without(t) - evenBell(t)); };
     const double odd_step = oddStep(odd, kBlurVariance), even_step = evenSlope(even, kBlurVariance);
     double odd_ramp = 0;
     for (int i = -kCentreTap * kFine; i <= kCentreTap * kFine; ++i) {
@@ -156,8 +164,8 @@ EdgeProfiler::EdgeProfiler() : row_sums_8_(rowSumsPortable), row_sums_16_(rowSum
       steps[2 * width + 1][i] = evenSlope(even, shapeVariance(i)) / even_step;
     }
     for (size_t phase = 0; phase < kPhases; ++phase) {
-      setTaps(odd, phase, banks_[0][phase].taps[2 * width]);
-      setTaps(even, phase, banks_[0][phase].taps[2 * width + 1]);
+      setTaps(odd, phase, kernels_[phase].taps[2 * width]);
+      setTaps(even, phase, kernels_[phase].taps[2 * width + 1]);
     }
   }
   const auto norm = [&](const int16_t* taps) {
@@ -165,7 +173,7 @@ EdgeProfiler::EdgeProfiler() : row_sums_8_(rowSumsPortable), row_sums_16_(rowSum
     for (int i = 0; i < kTaps; ++i) sum += static_cast<double>(taps[i]) * taps[i];
     return static_cast<float>(std::sqrt(sum));
   };
-  const Kernels& first = banks_[0][0];
+  const Kernels& first = kernels_[0];
   white_noise_ = {norm(first.taps[0]) * scale_[0],
                   norm(first.taps[1]) * scale_[1],
                   norm(first.taps[2]) * scale_[2],
@@ -173,42 +181,8 @@ EdgeProfiler::EdgeProfiler() : row_sums_8_(rowSumsPortable), row_sums_16_(rowSum
   for (size_t i = 0; i < kShapes; ++i) {
     ratio_[i] = static_cast<float>(steps[0][i] / steps[2][i]);
     narrow_gain_[i] = static_cast<float>(steps[0][i] / steps[1][i]);
+    wide_gain_[i] = static_cast<float>(steps[2][i] / steps[3][i]);
   }
-  for (size_t k = 0; k < kMatchedVariances.size(); ++k) {
-    const double variance = kMatchedVariances[k];
-    const auto bell = [&](double t) {
-      return std::exp(-0.5 * t * t / variance) * taper(t, kMatchedTaperFrom);
-    };
-    double sum = 0, window = 0;
-    for (int i = -kCentreTap * kFine; i <= kCentreTap * kFine; ++i) {
-      const double t = static_cast<double>(i) / kFine;
-      sum += bell(t);
-      window += taper(t, kMatchedTaperFrom);
-    }
-    const auto matched = [&](double t) {
-      return kKernelMax * (sum / window * taper(t, kMatchedTaperFrom) - bell(t));
-    };
-    banks_[1 + k] = banks_[0];
-    for (size_t phase = 0; phase < kPhases; ++phase) {
-      setTaps(matched, phase, banks_[1 + k][phase].taps[3]);
-    }
-    // In the units of the wide even filter.
-    matched_noise_[k] = norm(banks_[1 + k][0].taps[3]) * scale_[3];
-    for (size_t i = 0; i < kShapes; ++i) {
-      const double slope = evenSlope(matched, shapeVariance(i)) * static_cast<double>(scale_[3]);
-      matched_gain_[k][i] = static_cast<float>(steps[2][i] / slope);
-    }
-    matched_slope_[k] = 1 / gain(variance, variance).matched;
-  }
-}
-
-size_t EdgeProfiler::matchedFor(double blur_variance) {
-  size_t k = 0;
-  while (k + 1 < kMatchedVariances.size() &&
-         blur_variance * blur_variance > kMatchedVariances[k] * kMatchedVariances[k + 1]) {
-    ++k;
-  }
-  return k;
 }
 
 double EdgeProfiler::blurVariance(double narrow_over_wide) const {
@@ -219,7 +193,7 @@ double EdgeProfiler::blurVariance(double narrow_over_wide) const {
   return shapeVariance(i) * std::pow(kShapeStep, static_cast<double>(t));
 }
 
-StepGain EdgeProfiler::gain(double blur_variance, double matched_variance) const {
+StepGain EdgeProfiler::gain(double blur_variance) const {
   const double at =
       std::log(std::clamp(blur_variance, kLeastVariance, kMostVariance) / kLeastVariance) /
       kLogShapeStep;
@@ -228,13 +202,12 @@ StepGain EdgeProfiler::gain(double blur_variance, double matched_variance) const
   const auto between = [&](const std::array<float, kShapes>& table) {
     return table[i] + t * (table[i + 1] - table[i]);
   };
-  return {between(narrow_gain_), between(matched_gain_[matchedFor(matched_variance)])};
+  return {between(narrow_gain_), between(wide_gain_)};
 }
 
 template <class T>
 void EdgeProfiler::measureTyped(const T* data,
                                 const EdgeWindow& window,
-                                const std::array<Kernels, kPhases>& kernels,
                                 std::array<std::array<int32_t, 4>, kRows>* sums) const {
   const int rows = window.crosses_rows ? pixels_.height : pixels_.width;
   const int columns = window.crosses_rows ? pixels_.width : pixels_.height;
@@ -275,26 +248,24 @@ void EdgeProfiler::measureTyped(const T* data,
     if (from[k] == nullptr) {
       (*sums)[k] = {};
     } else if constexpr (sizeof(T) == 1) {
-      row_sums_8_(from[k], kernels[phases[k]], (*sums)[k].data());
+      row_sums_8_(from[k], kernels_[phases[k]], (*sums)[k].data());
     } else {
-      row_sums_16_(from[k], kernels[phases[k]], (*sums)[k].data());
+      row_sums_16_(from[k], kernels_[phases[k]], (*sums)[k].data());
     }
   }
 }
 
 void EdgeProfiler::measure(const EdgeWindow& window,
-                           size_t bank,
                            std::array<EdgeResponse, kRows>* responses) const {
   std::array<std::array<int32_t, 4>, kRows> sums;
   float unit = 1;
   if (pixels_.u8 != nullptr) {
-    measureTyped(pixels_.u8, window, banks_[bank], &sums);
+    measureTyped(pixels_.u8, window, &sums);
   } else {
-    measureTyped(pixels_.fixed, window, banks_[bank], &sums);
+    measureTyped(pixels_.fixed, window, &sums);
     unit = 1.0F / kGreyUnit;
   }
   // The positions were rounded to the filters' phases: moved back, to first order.
-  const float slope = bank == 0 ? 1 : matched_slope_[bank - 1];
   const double first = window.across - 3.5 * window.slope;
   for (int i = 0; i < kRows; ++i) {
     const auto& s = sums[static_cast<size_t>(i)];
@@ -306,7 +277,7 @@ void EdgeProfiler::measure(const EdgeWindow& window,
     const double exact = (first + i * window.slope) * kPhases;
     const auto rounding = static_cast<float>((std::floor(exact + 0.5) - exact) * (1.0 / kPhases));
     r.even_narrow += rounding * r.odd_narrow;
-    r.even_wide += rounding * slope * r.odd_wide;
+    r.even_wide += rounding * r.odd_wide;
   }
 }
 

@@ -10,17 +10,18 @@
 namespace dlsd {
 
 /// Response of the derivative of a Gaussian, in grey levels: the contrast of an isolated step that
-/// is exactly here, positive if it rises. And of the second derivative: even / odd (of sums over
-/// rows) is the offset in px from here to the step, to first order. The narrow filters keep apart
-/// what is close together, the wide ones average more noise.
+/// is exactly here, positive if it rises. And of an even filter: even / odd (of sums over rows) is
+/// the offset in px from here to the step, to first order, if its blur is
+/// EdgeProfiler::kBlurVariance (StepGain: for others). The narrow filters keep apart what is close
+/// together, the wide ones average more noise.
 struct EdgeResponse {
   float odd_narrow, even_narrow, odd_wide, even_wide;
 };
 
 /// How offsets follow from responses to a step of known blur.
 struct StepGain {
-  float narrow;   ///< offset = narrow * even_narrow / odd_narrow
-  float matched;  ///< offset = matched * (response of the matched filter) / odd_wide
+  float narrow;  ///< offset = narrow * even_narrow / odd_narrow
+  float wide;    ///< offset = wide * even_wide / odd_wide
 };
 
 /// Eight rows (columns) that a straight edge crosses.
@@ -36,6 +37,11 @@ class EdgeProfiler {
   static constexpr int kRows = 8;
   /// Standard deviations of the two Gaussians in px.
   static constexpr double kNarrowPx = 1, kWidePx = 2.2;
+  /// Variance of the Gaussian that the wide even filter is, less a window. With the levels of both
+  /// sides unknown it estimates a step's offset in white noise with a standard deviation of 1.2
+  /// times the Cramer-Rao bound at optical blur 0.7 px, 1.2 at 1 px, 1.4 at 1.5 px; the narrow even
+  /// filter (the second derivative) with 1.4, 1.8, 3.0.
+  static constexpr double kWideEvenVariance = 1.5;
   /// Variance of what blurs the edges: lens and pixel. Only the size of a correction depends on it,
   /// not where it is 0.
   static constexpr double kBlurVariance = 0.7;
@@ -46,19 +52,7 @@ class EdgeProfiler {
 
   /// At the predicted positions, one per row. Pixels beyond the border repeat it; rows beyond it
   /// answer 0.
-  void measure(const EdgeWindow& window, std::array<EdgeResponse, kRows>* responses) const {
-    measure(window, 0, responses);
-  }
-
-  /// The same, but even_wide is the response of a filter that is matched to a step of about this
-  /// blur: the estimate of the offset of an edge that stands alone which white noise moves least
-  /// (1.05 to 1.4 times the Cramer-Rao bound, for the levels of both sides have to be estimated,
-  /// too).
-  void measureMatched(const EdgeWindow& window,
-                      double blur_variance,
-                      std::array<EdgeResponse, kRows>* responses) const {
-    measure(window, 1 + matchedFor(blur_variance), responses);
-  }
+  void measure(const EdgeWindow& window, std::array<EdgeResponse, kRows>* responses) const;
 
   /// Variance (px^2, along the rows) of the blur that makes a step's response odd_narrow so many
   /// times odd_wide; between kLeastVariance and kMostVariance.
@@ -68,13 +62,8 @@ class EdgeProfiler {
   [[nodiscard]] double sharpestRatio() const { return static_cast<double>(ratio_[0]); }
   [[nodiscard]] double softestRatio() const { return static_cast<double>(ratio_[kShapes - 1]); }
 
-  /// For a step of this blur, measured with filters for `matched_variance`.
-  [[nodiscard]] StepGain gain(double blur_variance, double matched_variance) const;
-
-  /// Standard deviation of one row's matched response in white noise of one grey level.
-  [[nodiscard]] float matchedWhiteNoise(double matched_variance) const {
-    return matched_noise_[matchedFor(matched_variance)];
-  }
+  /// For a step of this blur.
+  [[nodiscard]] StepGain gain(double blur_variance) const;
 
   /// Standard deviations of one row's responses in white noise of one grey level.
   [[nodiscard]] const EdgeResponse& whiteNoise() const { return white_noise_; }
@@ -90,27 +79,16 @@ class EdgeProfiler {
   };
 
  private:
-  /// Blurs for which there is a matched filter.
-  static constexpr std::array<double, 8> kMatchedVariances{0.3, 0.45, 0.67, 1, 1.5, 2.2, 3.3, 5};
-  [[nodiscard]] static size_t matchedFor(double blur_variance);
-  void addMatched(size_t width);
-  void measure(const EdgeWindow& window,
-               size_t bank,
-               std::array<EdgeResponse, kRows>* responses) const;
   template <class T>
   void measureTyped(const T* data,
                     const EdgeWindow& window,
-                    const std::array<Kernels, kPhases>& kernels,
                     std::array<std::array<int32_t, 4>, kRows>* sums) const;
 
   GreyPixels pixels_;
-  /// The tracer's, then those with a matched filter in place of the wide even one.
-  std::array<std::array<Kernels, kPhases>, 1 + kMatchedVariances.size()> banks_;
+  std::array<Kernels, kPhases> kernels_;
   std::array<float, 4> scale_;  // of integer sums of 8-bit pixels
   EdgeResponse white_noise_{}, ramp_{};
-  std::array<float, kMatchedVariances.size()> matched_noise_{}, matched_slope_{};
-  std::array<float, kShapes> ratio_{}, narrow_gain_{};
-  std::array<std::array<float, kShapes>, kMatchedVariances.size()> matched_gain_{};
+  std::array<float, kShapes> ratio_{}, narrow_gain_{}, wide_gain_{};
   using RowSums8 = void (*)(const uint8_t*, const Kernels&, int32_t*);
   using RowSums16 = void (*)(const uint16_t*, const Kernels&, int32_t*);
   RowSums8 row_sums_8_;

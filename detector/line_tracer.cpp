@@ -17,8 +17,6 @@ constexpr float kMaxTangent = 0.325F;
 /// the edge stands alone: its neighbours would be seen, too.
 constexpr double kMaxNarrowSigmaPx = 0.2;
 constexpr double kAloneRatio[2] = {0.85, 1.25};
-/// Narrow over wide response from which an edge is sharper than EdgeProfiler::kBlurVariance.
-constexpr double kSharpRatio = 1.05;
 /// Blur of edges whose own can't be measured, across them: optics of 0.7 px and the pixel.
 constexpr double kUsualVariance = 0.7 * 0.7 + 1.0 / 12;
 /// What a filter of fixed shape leaves of an edge of another blur, and of its neighbours.
@@ -218,7 +216,7 @@ void LineTracer::judge(Quad* quad) const {
                   turn <= kMaxTangent * std::abs(odd) + 2 * kTurnScatter * noise &&
                   std::abs(quad->mean.odd_wide) <=
                       kMaxWideRatio * std::abs(quad->mean.odd_narrow) + 2 * noise_.odd_wide;
-  quad->offset_px = quad->is_edge ? (wide_ ? 1 : offset_gain_) * even / odd : 0;
+  quad->offset_px = quad->is_edge ? even / odd : 0;
   quad->variance_px2 = quad->is_edge ? noise * noise / (odd * odd) + kModelVariance : 0;
 }
 
@@ -430,95 +428,9 @@ LineTracer::End LineTracer::endOf(size_t first, size_t last, bool at_border) con
   return end;
 }
 
-/// Measures the quads again where the curve is now, with matched filters.
-void LineTracer::measureAgain(double row_variance) {
-  std::array<EdgeResponse, EdgeProfiler::kRows> rows;
-  struct Place {
-    RaySample sample;
-    double across = 0, slope = 0;
-    int first_row = 0;
-  };
-  const auto placeOf = [&](Quad* q) -> std::optional<Place> {
-    Place place;
-    const int a = q->crosses_rows ? 0 : 1;
-    Eigen::Vector2d at(static_cast<double>(q->x), static_cast<double>(q->y));
-    for (int iteration = 0; iteration < 2; ++iteration) {
-      const double u = std::clamp(at.x(), 0.0, pixels_.width - 1.0);
-      const double v = std::clamp(at.y(), 0.0, pixels_.height - 1.0);
-      if (!rays_.covers(u, v)) return std::nullopt;
-      place.sample = rays_.at(u, v);
-      const Eigen::Vector2d g(place.sample.du.dot(normal_), place.sample.dv.dot(normal_));
-      if (!(std::abs(g[a]) * 4 > std::abs(g[1 - a]))) return std::nullopt;
-      const double f = place.sample.ray.dot(normal_) + (at.x() - u) * g.x() + (at.y() - v) * g.y();
-      const double step = -f / g[a];
-      if (!(std::abs(step) < 2)) return std::nullopt;
-      place.sample.ray += (at.x() - u) * place.sample.du + (at.y() - v) * place.sample.dv +
-                          step * (a == 0 ? place.sample.du : place.sample.dv);
-      at[a] += step;
-      place.slope = -g[1 - a] / g[a];
-      if (std::abs(step) < 0.02) break;
-    }
-    place.across = at[a];
-    place.first_row = static_cast<int>(std::lround(at[1 - a] - 1.5));
-    q->ray = projected(place.sample.ray, normal_);
-    q->across = a == 0 ? place.sample.du : place.sample.dv;
-    q->x = static_cast<float>(at.x());
-    q->y = static_cast<float>(at.y());
-    q->slope = static_cast<float>(place.slope);
-    q->perpendicular = static_cast<float>(1 / std::sqrt(1 + place.slope * place.slope));
-    return place;
-  };
-  const auto take = [&](size_t first, Quad* q) {
-    EdgeResponse mean{};
-    for (size_t k = first; k < first + kQuadPx; ++k) {
-      mean.odd_narrow += rows[k].odd_narrow / kQuadPx;
-      mean.even_narrow += rows[k].even_narrow / kQuadPx;
-      mean.odd_wide += rows[k].odd_wide / kQuadPx;
-      mean.even_wide += rows[k].even_wide / kQuadPx;
-    }
-    q->mean = mean;
-  };
-  for (size_t i = 0; i < quads_.size();) {
-    Quad& one = quads_[i];
-    const auto place = placeOf(&one);
-    if (!place) {
-      one.is_edge = false;
-      ++i;
-      continue;
-    }
-    // Two that follow each other are measured together.
-    Quad* other = i + 1 < quads_.size() ? &quads_[i + 1] : nullptr;
-    if (other != nullptr && other->crosses_rows != one.crosses_rows) other = nullptr;
-    std::optional<Place> next;
-    if (other != nullptr) next = placeOf(other);
-    if (next && std::abs(next->first_row - place->first_row) != kQuadPx) next.reset();
-    double bend = 0;
-    EdgeWindow window{one.crosses_rows, place->first_row, 0, place->slope};
-    const bool downwards = next && next->first_row < place->first_row;
-    if (next) {
-      const double way = downwards ? -1 : 1;
-      window.slope = way * (next->across - place->across) / kQuadPx;
-      bend = way * (next->slope - place->slope) / kQuadPx;
-      window.first_row = std::min(place->first_row, next->first_row);
-      window.across = (place->across + next->across) / 2;
-    } else {
-      window.across = place->across + 2 * place->slope;
-    }
-    // The mean of a parabola over four rows.
-    constexpr double kMeanSquare = 1.25;
-    window.across += 0.5 * bend * kMeanSquare;
-    profiler_.measureMatched(window, row_variance, &rows);
-    take(downwards ? 4 : 0, &one);
-    ++i;
-    if (next) {
-      take(downwards ? 0 : 4, other);
-      ++i;
-    }
-  }
-}
-
-/// The last fit: every quad once more at the curve as known by now, with the gain that belongs to
-/// the edge's own blur. Where the edge stands alone, with filters matched to it.
+/// Offsets for the last fit: with the gain that belongs to the edge's own blur; from the wide
+/// filters where the edge stands alone, which scatter less; measured again if the curve has moved
+/// far.
 void LineTracer::refine() {
   double narrow = 0, wide = 0, stretch = 0;
   int count = 0;
@@ -537,11 +449,6 @@ void LineTracer::refine() {
                narrow >= profiler_.softestRatio() * wide - tolerance;
   const double row_variance =
       alone ? profiler_.blurVariance(narrow / wide) : kUsualVariance * stretch;
-  measureAgain(row_variance);
-
-  const EdgeResponse& white = profiler_.whiteNoise();
-  const float matched_noise =
-      profiler_.matchedWhiteNoise(row_variance) * noise_.odd_wide / white.odd_wide;
   struct Sums {
     double w = 0, t = 0, tt = 0, d = 0, td = 0;
   } sums;
@@ -549,12 +456,12 @@ void LineTracer::refine() {
   int differing = 0;
   constexpr float kModelDifference = 0.02F;
   const auto half = 0.5 * static_cast<double>(quads_.size() - 1);
-  const auto matchedOffset = [&](const Quad& q, const StepGain& gain) {
-    return gain.matched * q.mean.even_wide / q.mean.odd_wide;
+  const auto wideOffset = [&](const Quad& q, const StepGain& gain) {
+    return gain.wide * q.mean.even_wide / q.mean.odd_wide;
   };
   const auto gainOf = [&](const Quad& q) {
     const double p = static_cast<double>(q.perpendicular);
-    return profiler_.gain(row_variance / stretch / (p * p), row_variance);
+    return profiler_.gain(row_variance / stretch / (p * p));
   };
   const auto sigmaOf = [](float gain, float noise, float level) {
     return gain * noise / std::abs(level);
@@ -566,13 +473,14 @@ void LineTracer::refine() {
     q.offset_px = gain.narrow * q.mean.even_narrow / q.mean.odd_narrow;
     const float sigma = sigmaOf(gain.narrow, noise_.even_narrow, q.mean.odd_narrow);
     q.variance_px2 = sigma * sigma + kModelVariance;
-    q.is_edge =
-        std::abs(q.offset_px) * q.perpendicular <= bound_px_ && std::isfinite(q.variance_px2);
+    const float bound =
+        std::max(bound_px_, static_cast<float>(options_.max_residual_sigmas) * sigma);
+    q.is_edge = std::isfinite(sigma) && std::abs(q.offset_px) * q.perpendicular <= bound;
     if (!q.is_edge || !alone) continue;
-    const float matched_sigma = sigmaOf(gain.matched, matched_noise, q.mean.odd_wide);
-    const float variance = std::max(0.0F, sigma * sigma - matched_sigma * matched_sigma) +
+    const float wide_sigma = sigmaOf(gain.wide, noise_.even_wide, q.mean.odd_wide);
+    const float variance = std::max(0.0F, sigma * sigma - wide_sigma * wide_sigma) +
                            kModelDifference * kModelDifference;
-    const float difference = matchedOffset(q, gain) - q.offset_px;
+    const float difference = wideOffset(q, gain) - q.offset_px;
     differing += difference * difference > 9 * variance;
     const double w = 1 / static_cast<double>(variance), d = static_cast<double>(difference);
     sums.w += w;
@@ -593,8 +501,8 @@ void LineTracer::refine() {
   for (Quad& q : quads_) {
     if (!q.is_edge) continue;
     const StepGain gain = gainOf(q);
-    const float offset = matchedOffset(q, gain);
-    const float sigma = sigmaOf(gain.matched, matched_noise, q.mean.odd_wide);
+    const float offset = wideOffset(q, gain);
+    const float sigma = sigmaOf(gain.wide, noise_.even_wide, q.mean.odd_wide);
     const float variance = sigma * sigma + kModelVariance;
     const float difference = offset - q.offset_px;
     if (difference * difference > 9 * q.variance_px2 || !(variance < q.variance_px2)) continue;
@@ -611,49 +519,44 @@ std::optional<TracedLine> LineTracer::trace(const PlanarPiece& piece,
   angle_rad_ = 0;
   wide_ = false;
   bound_px_ = 1.5F;  // chains are whole pixels
-  offset_gain_ = 1;
 
-  // The plane of the piece from a few of its rows.
-  constexpr uint32_t kProbes = 6;
-  const uint32_t probes = std::min(kProbes, piece.nodes);
+  // The plane of the piece from a few of its rows: more of them if they scatter.
+  constexpr uint32_t kProbes = 3;
   std::array<Quad, 2> pair;
   double level = 0, wide_level = 0;
-  for (int round = 0; round < 2; ++round) {
-    moments_ = {};
-    points_ = 0;
-    level = wide_level = 0;
-    for (uint32_t i = 0; i < probes; ++i) {
-      const uint32_t node = piece.first_node + (2 * i + 1) * piece.nodes / (2 * probes);
-      Front front;
-      front.position = nodes[node].cast<double>();
-      // Eight rows around the node.
-      const RaySample sample = rays_.at(front.position.x(), front.position.y());
-      const Eigen::Vector2d g(sample.du.dot(normal_), sample.dv.dot(normal_));
-      const int a = std::abs(g.x()) >= std::abs(g.y()) ? 0 : 1;
-      if (!(std::abs(g[a]) > 0)) continue;
-      front.position[a] -= sample.ray.dot(normal_) / g[a];
-      front.position[1 - a] -= 4;
-      front.position[a] += 4 * g[1 - a] / g[a];
-      if (!evaluate(&front, +1, &pair)) continue;
-      for (const Quad& q : pair) {
-        if (!q.is_edge) continue;
-        add(q);
-        level += std::abs(static_cast<double>(q.mean.odd_narrow));
-        wide_level += std::abs(static_cast<double>(q.mean.odd_wide));
-      }
+  const auto probe = [&](uint32_t node) {
+    Front front;
+    front.position = nodes[piece.first_node + node].cast<double>();
+    // Eight rows around the node.
+    const RaySample sample = rays_.at(front.position.x(), front.position.y());
+    const Eigen::Vector2d g(sample.du.dot(normal_), sample.dv.dot(normal_));
+    const int a = std::abs(g.x()) >= std::abs(g.y()) ? 0 : 1;
+    if (!(std::abs(g[a]) > 0)) return;
+    front.position[a] -= sample.ray.dot(normal_) / g[a];
+    front.position[1 - a] -= 4;
+    front.position[a] += 4 * g[1 - a] / g[a];
+    if (!evaluate(&front, +1, &pair)) return;
+    for (const Quad& q : pair) {
+      if (!q.is_edge) continue;
+      add(q);
+      level += std::abs(static_cast<double>(q.mean.odd_narrow));
+      wide_level += std::abs(static_cast<double>(q.mean.odd_wide));
     }
-    if (points_ < 2 || !refit()) return std::nullopt;
-    if (level <= kSharpRatio * wide_level) break;
-    // Sharper than the filters expect: offsets are smaller than they seem.
-    const double variance = profiler_.blurVariance(level / wide_level);
-    offset_gain_ = profiler_.gain(variance, variance).narrow;
+  };
+  const uint32_t probes = std::min(kProbes, piece.nodes);
+  for (uint32_t i = 0; i < probes; ++i) probe((2 * i + 1) * piece.nodes / (2 * probes));
+  const auto narrowSigmaPx = [&] {
+    return points_ * static_cast<double>(noise_.even_narrow) / level;
+  };
+  if (piece.nodes >= 2 * kProbes && !(narrowSigmaPx() <= kMaxNarrowSigmaPx)) {
+    for (uint32_t i = 0; i < kProbes; ++i) probe(i * piece.nodes / kProbes);
   }
+  if (points_ < 2 || !refit()) return std::nullopt;
   const double tolerance = 2 * static_cast<double>(noise_.odd_narrow) * std::sqrt(points_);
   const bool stands_alone = wide_level >= kAloneRatio[0] * level - tolerance &&
                             wide_level <= kAloneRatio[1] * level + tolerance;
-  level /= points_;
-  const double narrow_sigma_px = static_cast<double>(noise_.even_narrow) / level;
-  const double wide_sigma_px = static_cast<double>(noise_.even_wide) / level;
+  const double narrow_sigma_px = narrowSigmaPx();
+  const double wide_sigma_px = points_ * static_cast<double>(noise_.even_wide) / level;
   wide_ = narrow_sigma_px > kMaxNarrowSigmaPx && stands_alone;
   bound_px_ = static_cast<float>(
       std::clamp(options_.max_residual_sigmas * (wide_ ? wide_sigma_px : narrow_sigma_px),
@@ -689,11 +592,14 @@ std::optional<TracedLine> LineTracer::trace(const PlanarPiece& piece,
     std::reverse(q.odd.begin(), q.odd.end());
   }
   quads_.insert(quads_.end(), forward_.begin(), forward_.end());
-  cut(&quads_, &front);
-  std::reverse(quads_.begin(), quads_.end());
-  cut(&quads_, &back);
-  std::reverse(quads_.begin(), quads_.end());
-  if (quads_.size() < 3) return std::nullopt;
+  const auto cutBoth = [&] {
+    cut(&quads_, &front);
+    std::reverse(quads_.begin(), quads_.end());
+    cut(&quads_, &back);
+    std::reverse(quads_.begin(), quads_.end());
+    return quads_.size() >= 3;
+  };
+  if (!cutBoth()) return std::nullopt;
 
   double narrow = 0, wide = 0;
   for (const Quad& q : quads_) {
@@ -705,6 +611,7 @@ std::optional<TracedLine> LineTracer::trace(const PlanarPiece& piece,
   line.score = scoreOf();
   if (!(line.score >= options_.min_score)) return std::nullopt;
   refine();
+  if (!cutBoth()) return std::nullopt;
 
   // Near its ends an edge meets others, which move it: a line that has enough points is fitted
   // without, and then again with what agrees.

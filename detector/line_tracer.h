@@ -100,7 +100,6 @@ class LineTracer {
   void add(const Quad& quad);
   void extend(int direction, std::vector<Quad>* quads, Front* front);
   bool refit();
-  void measureAgain(double row_variance);
   void refine();
   [[nodiscard]] bool isArc(const Eigen::Vector3d& normal) const;
   [[nodiscard]] double scoreOf() const;
@@ -121,7 +120,6 @@ class LineTracer {
   Eigen::Vector3d normal_;
   bool wide_ = false;  // which filters judge
   float bound_px_ = 1;
-  float offset_gain_ = 1;  // of this line's sharpness
   int points_ = 0, points_at_fit_ = 0;
   double angle_rad_ = 0;
 };
