@@ -12,6 +12,7 @@
 #include "detector/paper_detector.h"
 #include "detector/plane_detector.h"
 #include "detector/stop_watch.h"
+#include "detector/thin_bars.h"
 #include "detector/usable_mask.h"
 
 namespace dlsd {
@@ -78,6 +79,7 @@ struct Detector::Impl {
       paper.emplace(rays, the_options);
     } else {
       planes.emplace(rays, the_options);
+      bars.emplace(rays);
     }
   }
 
@@ -88,6 +90,7 @@ struct Detector::Impl {
   BitRows masked;
   std::optional<PaperDetector> paper;
   std::optional<PlaneDetector> planes;
+  std::optional<ThinBarMerger> bars;
   std::vector<DetectedLine> lines;
   StageTimes times;
 };
@@ -116,6 +119,7 @@ void Detector::Impl::run(const ImageView& image, const BitRows& where) {
     line.to_px = *to_px;
     return false;
   });
+  if (bars) bars->merge(&lines);
   std::sort(lines.begin(), lines.end(), [](const DetectedLine& a, const DetectedLine& b) {
     const auto position = [](const DetectedLine& l) {
       return std::make_tuple(l.from_px.x(), l.from_px.y(), l.to_px.x(), l.to_px.y());

@@ -93,7 +93,7 @@ DLSD_AVX2 void rowSums16Avx2(const uint16_t* pixels,
 #endif
 
 /// Ratio of the variances of neighbouring blurs in the tables, and its logarithm.
-constexpr double kShapeStep = 1.2, kLogShapeStep = 0.1823215567939546;
+constexpr double kShapeStep = 1.32, kLogShapeStep = 0.27763173659827955;
 double shapeVariance(size_t i) {
   return EdgeProfiler::kLeastVariance * std::pow(kShapeStep, static_cast<double>(i));
 }

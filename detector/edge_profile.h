@@ -57,7 +57,7 @@ class EdgeProfiler {
   /// Variance (px^2, along the rows) of the blur that makes a step's response odd_narrow so many
   /// times odd_wide; between kLeastVariance and kMostVariance.
   [[nodiscard]] double blurVariance(double narrow_over_wide) const;
-  static constexpr double kLeastVariance = 1.0 / 12, kMostVariance = 5.52;
+  static constexpr double kLeastVariance = 0.01, kMostVariance = 5.93;
   /// odd_narrow over odd_wide at these two.
   [[nodiscard]] double sharpestRatio() const { return static_cast<double>(ratio_[0]); }
   [[nodiscard]] double softestRatio() const { return static_cast<double>(ratio_[kShapes - 1]); }

@@ -27,6 +27,12 @@ constexpr float kMaxWideRatio = 1.45F;
 /// Standard deviations of noise that the response of an edge exceeds.
 constexpr float kEdgeSigmas = 2.5F;
 
+/// What odd_narrow would be if the edge had been looked for where it is, relative to odd_wide.
+double narrowLevel(const EdgeResponse& r) {
+  const auto odd = static_cast<double>(r.odd_narrow), even = static_cast<double>(r.even_narrow);
+  return odd == 0 ? 0 : std::abs(odd) * (1 + 0.15 * std::min(1.0, even * even / (odd * odd)));
+}
+
 Eigen::Vector3d projected(const Eigen::Vector3d& ray, const Eigen::Vector3d& normal) {
   return (ray - ray.dot(normal) * normal).normalized();
 }
@@ -207,16 +213,17 @@ void LineTracer::judge(Quad* quad) const {
   const float odd = wide_ ? quad->mean.odd_wide : quad->mean.odd_narrow;
   const float even = wide_ ? quad->mean.even_wide : quad->mean.even_narrow;
   const float noise = wide_ ? noise_.even_wide : noise_.even_narrow;
+  const float gain = wide_ ? 1 : offset_gain_;
   // The offset's change from row to row, by least squares, scatters 2 / sqrt(5) as much as the
   // mean.
   constexpr float kTurnScatter = 0.894F;
   const float turn = std::abs(quad->turn) * quad->perpendicular * quad->perpendicular;
   quad->is_edge = std::abs(odd) >= (wide_ ? min_odd_wide_ : min_odd_narrow_) &&
-                  std::abs(even) * quad->perpendicular <= bound_px_ * std::abs(odd) &&
+                  std::abs(even) * gain * quad->perpendicular <= bound_px_ * std::abs(odd) &&
                   turn <= kMaxTangent * std::abs(odd) + 2 * kTurnScatter * noise &&
                   std::abs(quad->mean.odd_wide) <=
                       kMaxWideRatio * std::abs(quad->mean.odd_narrow) + 2 * noise_.odd_wide;
-  quad->offset_px = quad->is_edge ? even / odd : 0;
+  quad->offset_px = quad->is_edge ? gain * even / odd : 0;
   quad->variance_px2 = quad->is_edge ? noise * noise / (odd * odd) + kModelVariance : 0;
 }
 
@@ -436,7 +443,7 @@ void LineTracer::refine() {
   int count = 0;
   for (const Quad& q : quads_) {
     if (!q.is_edge) continue;
-    narrow += std::abs(static_cast<double>(q.mean.odd_narrow));
+    narrow += narrowLevel(q.mean);
     wide += std::abs(static_cast<double>(q.mean.odd_wide));
     stretch += 1 / static_cast<double>(q.perpendicular * q.perpendicular);
     ++count;
@@ -519,10 +526,13 @@ std::optional<TracedLine> LineTracer::trace(const PlanarPiece& piece,
   angle_rad_ = 0;
   wide_ = false;
   bound_px_ = 1.5F;  // chains are whole pixels
+  offset_gain_ = 1;
 
   // The plane of the piece from a few of its rows: more of them if they scatter.
   constexpr uint32_t kProbes = 3;
   std::array<Quad, 2> pair;
+  std::array<Quad, 2 * 2 * kProbes> probed;
+  size_t count = 0;
   double level = 0, wide_level = 0;
   const auto probe = [&](uint32_t node) {
     Front front;
@@ -538,25 +548,33 @@ std::optional<TracedLine> LineTracer::trace(const PlanarPiece& piece,
     if (!evaluate(&front, +1, &pair)) return;
     for (const Quad& q : pair) {
       if (!q.is_edge) continue;
-      add(q);
-      level += std::abs(static_cast<double>(q.mean.odd_narrow));
+      probed[count++] = q;
+      level += narrowLevel(q.mean);
       wide_level += std::abs(static_cast<double>(q.mean.odd_wide));
     }
   };
   const uint32_t probes = std::min(kProbes, piece.nodes);
   for (uint32_t i = 0; i < probes; ++i) probe((2 * i + 1) * piece.nodes / (2 * probes));
   const auto narrowSigmaPx = [&] {
-    return points_ * static_cast<double>(noise_.even_narrow) / level;
+    return static_cast<double>(count) * static_cast<double>(noise_.even_narrow) / level;
   };
   if (piece.nodes >= 2 * kProbes && !(narrowSigmaPx() <= kMaxNarrowSigmaPx)) {
     for (uint32_t i = 0; i < kProbes; ++i) probe(i * piece.nodes / kProbes);
   }
-  if (points_ < 2 || !refit()) return std::nullopt;
+  if (count < 2) return std::nullopt;
+  // Of an edge sharper than the filters expect, offsets are smaller than they seem.
+  offset_gain_ = std::min(1.0F, profiler_.gain(profiler_.blurVariance(level / wide_level)).narrow);
+  for (size_t i = 0; i < count; ++i) {
+    probed[i].offset_px *= offset_gain_;
+    add(probed[i]);
+  }
+  if (!refit()) return std::nullopt;
   const double tolerance = 2 * static_cast<double>(noise_.odd_narrow) * std::sqrt(points_);
   const bool stands_alone = wide_level >= kAloneRatio[0] * level - tolerance &&
                             wide_level <= kAloneRatio[1] * level + tolerance;
   const double narrow_sigma_px = narrowSigmaPx();
-  const double wide_sigma_px = points_ * static_cast<double>(noise_.even_wide) / level;
+  const double wide_sigma_px =
+      static_cast<double>(count) * static_cast<double>(noise_.even_wide) / level;
   wide_ = narrow_sigma_px > kMaxNarrowSigmaPx && stands_alone;
   bound_px_ = static_cast<float>(
       std::clamp(options_.max_residual_sigmas * (wide_ ? wide_sigma_px : narrow_sigma_px),

@@ -120,6 +120,7 @@ class LineTracer {
   Eigen::Vector3d normal_;
   bool wide_ = false;  // which filters judge
   float bound_px_ = 1;
+  float offset_gain_ = 1;  // of narrow offsets, by this line's sharpness
   int points_ = 0, points_at_fit_ = 0;
   double angle_rad_ = 0;
 };
