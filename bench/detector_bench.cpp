@@ -119,7 +119,7 @@ int printTimes(int rounds, const std::string& only_camera) {
                        }});
       }
       for (const auto& [name, run] : peers()) {
-        all.push_back({name + " raw", [run](const Image& image) { run(matOf(image)); }});
+        all.push_back({name + " raw", [run = run](const Image& image) { run(matOf(image)); }});
       }
       const Crop crop = cropView(camera,
                                  {.kind = ViewKind::kPinhole,
@@ -134,7 +134,8 @@ int printTimes(int rounds, const std::string& only_camera) {
                        cv::remap(matOf(image), *rectified, u, v, cv::INTER_LINEAR);
                      }});
       for (const auto& [name, run] : peers()) {
-        all.push_back({name + " rectified", [run, rectified](const Image&) { run(*rectified); }});
+        all.push_back(
+            {name + " rectified", [run = run, rectified](const Image&) { run(*rectified); }});
       }
 
       std::vector<std::vector<double>> ratios(all.size());
