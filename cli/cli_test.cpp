@@ -28,7 +28,7 @@ using testing::StartsWith;
 
 TEST_F(Cli, HelpShowsExamples) {
   for (const char* command :
-       {"generate", "detect", "evaluate", "camera", "camera show", "report", "replay"}) {
+       {"generate", "detect", "evaluate", "camera", "camera show", "export", "report", "replay"}) {
     SCOPED_TRACE(command);
     const Result result = dlsd(std::string(command) + " --help");
     EXPECT_EQ(result.code, 0);
@@ -43,7 +43,7 @@ TEST_F(Cli, HelpShowsExamples) {
 }
 
 TEST_F(Cli, UsageErrorsAreTwo) {
-  expectRefused("", 2, "generate, detect, evaluate, camera, report, replay");
+  expectRefused("", 2, "generate, detect, evaluate, camera, export, report, replay");
   for (const char* seed : {"18446744073709551616", "0x10", "+1", "1.0", "1e3", "\"''\""}) {
     expectRefused(std::string("generate --camera wide.yaml --out data --seed ") + seed, 2, "seed");
   }
@@ -301,32 +301,6 @@ TEST_F(Cli, SeedsAreDecimalNumbersUpTo64Bit) {
   };
   EXPECT_EQ(seedOf("data-18446744073709551615"), UINT64_MAX);
   EXPECT_EQ(seedOf("data-010"), 10U);
-}
-
-TEST_F(Cli, InterruptedRunsLeaveNothingHalfWritten) {
-  const struct {
-    std::string name;
-    int code;
-  } cases[] = {{"INT", 130}, {"TERM", 143}};
-  for (const auto& [name, code] : cases) {
-    SCOPED_TRACE(name);
-    const std::string data = "data-" + name;
-    const std::string command =
-        "cd '" + folder.string() + "' && timeout --preserve-status -s " + name +
-        " 0.7 '" DLSD_BINARY "' generate --camera wide.yaml --count 1000000 --out " + data +
-        " 2>.stderr";
-    const int status = std::system(command.c_str());
-    EXPECT_EQ(WEXITSTATUS(status), code);
-    EXPECT_EQ(contentOf(folder / ".stderr"), "");
-    EXPECT_FALSE(fs::exists(folder / data / "manifest.json"));
-    for (const std::string& file : files()) {
-      if (file.starts_with(data + "/labels/") && file.ends_with(".json")) {
-        EXPECT_TRUE(nlohmann::json::accept(contentOf(folder / file))) << file;
-      } else if (file.starts_with(data + "/images/") && file.ends_with(".png")) {
-        EXPECT_THAT(contentOf(folder / file), EndsWith("IEND\xae\x42\x60\x82")) << file;
-      }
-    }
-  }
 }
 
 TEST_F(Cli, OneBadImageAmongManyIsNamedAndTheOthersAreDone) {

@@ -31,6 +31,12 @@ double now() {
   return std::chrono::duration<double>(Clock::now().time_since_epoch()).count();
 }
 
+volatile sig_atomic_t signal_that_came = 0;
+
+extern "C" void rememberSignal(int signal) {
+  signal_that_came = signal;
+}
+
 /// What a path leads to: the file if there is one, else the place. Empty for devices and pipes,
 /// which nothing replaces.
 std::string identityOf(const std::string& path) {
@@ -78,6 +84,29 @@ void hushLibraries() {
   }
   if (nowhere > STDERR_FILENO) {
     ::close(nowhere);
+  }
+}
+
+Interruption::Interruption() {
+  signal_that_came = 0;
+  struct sigaction action {};
+  action.sa_handler = rememberSignal;
+  action.sa_flags = SA_RESTART | static_cast<int>(SA_RESETHAND);
+  ::sigaction(SIGINT, &action, &old_int_);
+  ::sigaction(SIGTERM, &action, &old_term_);
+  // What nohup or a shell's background told to be ignored stays so.
+  if (old_int_.sa_handler == SIG_IGN) ::sigaction(SIGINT, &old_int_, nullptr);
+  if (old_term_.sa_handler == SIG_IGN) ::sigaction(SIGTERM, &old_term_, nullptr);
+}
+
+Interruption::~Interruption() {
+  ::sigaction(SIGINT, &old_int_, nullptr);
+  ::sigaction(SIGTERM, &old_term_, nullptr);
+}
+
+void Interruption::check(std::string_view what_now) const {
+  if (const int signal = signal_that_came; signal != 0) {
+    throw Interrupted(fmt::format("interrupted: {}", what_now), signal);
   }
 }
 

@@ -1,10 +1,13 @@
 #pragma once
 // The commands of `dlsd`, one file each, and what they share.
 
+#include <signal.h>
+
 #include <CLI/App.hpp>
 #include <charconv>
 #include <concepts>
 #include <functional>
+#include <stdexcept>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -25,6 +28,7 @@ Run addGenerate(CLI::App& command);
 Run addDetect(CLI::App& command);
 Run addEvaluate(CLI::App& command);
 Run addCamera(CLI::App& command);
+Run addExport(CLI::App& command);
 Run addReport(CLI::App& command);
 Run addReplay(CLI::App& command);
 
@@ -61,6 +65,29 @@ template <std::integral T>
 
 /// Whether the text can stand in JSON.
 [[nodiscard]] bool isUtf8(const std::string& text);
+
+/// SIGINT or SIGTERM came. main.cpp makes the exit code 128 + signal of it.
+struct Interrupted : std::runtime_error {
+  Interrupted(const std::string& message, int which) : std::runtime_error(message), signal(which) {}
+  int signal;
+};
+
+/// While one lives, the first SIGINT or SIGTERM only makes check() throw, so that a command ends
+/// where all its files are complete; a second one ends the program at once.
+class Interruption {
+ public:
+  Interruption();
+  ~Interruption();
+  Interruption(const Interruption&) = delete;
+  Interruption& operator=(const Interruption&) = delete;
+
+  /// Throws Interrupted if a signal came: "interrupted: <what_now>".
+  void check(std::string_view what_now) const;
+
+ private:
+  struct sigaction old_int_ {
+  }, old_term_{};
+};
 
 /// The files that the manifest names, and the manifest.
 [[nodiscard]] std::vector<std::string> filesOf(const Dataset& dataset);

@@ -9,11 +9,13 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <set>
 
 #include "cameras/calibration/calibration.h"
 #include "cameras/calibration/files.h"
 #include "cli/command.h"
+#include "synth/dataset/verify.h"
 #include "synth/scene.h"
 
 namespace dlsd::cli {
@@ -24,6 +26,7 @@ struct Arguments {
   std::string shard = "0/1";
   std::string encoding = "linear";
   std::vector<std::string> planes;
+  std::string verify;
   GenerateOptions options;
 };
 
@@ -51,8 +54,31 @@ void readShard(const std::string& text, GenerateOptions* options) {
   throw InputError("--shard is \"" + text + "\", allowed is i/n as in 0/4, with i from 0 to n - 1");
 }
 
+int verify(const std::string& folder) {
+  std::optional<Progress> progress;
+  const DatasetCheck check = verifyDataset(folder, [&](size_t done, size_t total) {
+    if (!progress) progress.emplace("frames", total);
+    progress->done(done);
+  });
+  progress.reset();
+  for (const std::string& problem : check.problems) print(problem + "\n");
+  print(fmt::format("{}: {} of {} frames are whole\n", folder, check.whole, check.named));
+  if (check.problems.empty()) return kDone;
+  complain(fmt::format("{}: {} wrong, the dlsd generate that made it makes it whole again",
+                       folder,
+                       check.problems.size() == 1
+                           ? "1 thing is"
+                           : fmt::format("{} things are", check.problems.size())));
+  return kCheckFailed;
+}
+
 int run(Arguments& arguments) {
   GenerateOptions& options = arguments.options;
+  if (!arguments.verify.empty()) return verify(arguments.verify);
+  for (const auto& [name, given] :
+       {std::pair("--camera", !arguments.cameras.empty()), {"--out", !options.out.empty()}}) {
+    if (!given) throw InputError(std::string(name) + " is required");
+  }
   std::set<std::string> names;
   for (const std::string& path : arguments.cameras) {
     options.cameras.emplace_back(nameOf(path), loadCamera(path));
@@ -72,8 +98,14 @@ int run(Arguments& arguments) {
   {
     const int own = options.count - options.shard_index + options.shard_count - 1;
     Progress progress("frames", size_t(own / options.shard_count));
-    result =
-        generateDataset(options, [&](const GenerateProgress& p) { progress.done(size_t(p.done)); });
+    const Interruption interruption;
+    result = generateDataset(options, [&](const GenerateProgress& p) {
+      progress.done(size_t(p.done));
+      if (p.done < p.total) {
+        interruption.check(fmt::format(
+            "{} of {} frames are finished, the same command goes on from there", p.done, p.total));
+      }
+    });
   }
   print(fmt::format("{}: {} frames, {} made now, {} kept\n",
                     options.out,
@@ -95,10 +127,9 @@ Run addGenerate(CLI::App& command) {
           "Calibration file, or file:camera if it holds several; may be repeated: frames go "
           "round")
       ->type_name("FILE")
-      ->required()
       ->expected(1)
       ->take_all();
-  command.add_option("--out", options.out, "Folder for the dataset")->type_name("DIR")->required();
+  command.add_option("--out", options.out, "Folder for the dataset")->type_name("DIR");
   command
       .add_option("--scene",
                   options.scene,
@@ -167,6 +198,13 @@ Run addGenerate(CLI::App& command) {
   command
       .add_option("--shard", arguments->shard, "i/n: make only the frames with number mod n = i")
       ->type_name("I/N");
+  command
+      .add_option("--verify",
+                  arguments->verify,
+                  "Make nothing: check that every file of this dataset is there and unchanged")
+      ->type_name("DIR")
+      ->excludes("--camera")
+      ->excludes("--out");
   command.footer(
       "Examples:\n"
       "  dlsd generate --camera wide.yaml --count 100 --out data\n"
@@ -174,7 +212,8 @@ Run addGenerate(CLI::App& command) {
       "data\n"
       "  dlsd generate --camera wide.yaml --planes depth,normal,df --out data\n"
       "  dlsd generate --camera wide.yaml --count 1000 --shard 0/4 --out data   (and 1/4, 2/4, "
-      "3/4)");
+      "3/4)\n"
+      "  dlsd generate --verify data   (exit code 1 and what is wrong, if anything is)");
   return [arguments] { return run(*arguments); };
 }
 

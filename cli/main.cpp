@@ -35,6 +35,7 @@ constexpr Entry kCommands[] = {
     {"detect", "Find straight 3D lines in distorted images.", addDetect},
     {"evaluate", "Compare detections with the exact labels of a dataset.", addEvaluate},
     {"camera", "Look at calibration files.", addCamera},
+    {"export", "Write a dataset in the form of another program's loader.", addExport},
     {"report", "Write a static HTML page of a dataset and its detections.", addReport},
     {"replay", "Make a saved property case again and check it.", addReplay},
 };
@@ -138,6 +139,9 @@ int main(int argc, char** argv) {
   hushLibraries();
   try {
     return run(argc, argv);
+  } catch (const Interrupted& interrupted) {
+    complain(interrupted.what());
+    return 128 + interrupted.signal;
   } catch (const dlsd::InputError& error) {
     complain(error.what());
     return kBadInput;

@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cerrno>
 #include <cstdio>
 #include <deque>
 #include <filesystem>
@@ -18,6 +19,7 @@
 #include <set>
 #include <sstream>
 #include <stdexcept>
+#include <system_error>
 
 #include "cameras/calibration/calibration.h"
 #include "cameras/calibration/files.h"
@@ -302,7 +304,13 @@ class Journal {
     for (const auto& entry : fs::directory_iterator(folder, error)) {
       const std::string name = entry.path().filename().string();
       if (!isJournal(name)) continue;
-      const std::string text = readFile(folder + "/" + name);
+      std::string text;
+      try {
+        text = readFile(folder + "/" + name);
+      } catch (const InputError&) {
+        if (!fs::exists(entry.path(), error)) continue;  // That shard has just finished.
+        throw;
+      }
       if (!text.starts_with(head_)) {
         throw InputError(folder + " holds an unfinished dataset of another configuration (" + name +
                          "): choose another folder or delete it");
@@ -325,7 +333,9 @@ class Journal {
       file_.open(path_, std::ios::binary | std::ios::app);
     }
     file_ << journalLine(index, hashes) << std::flush;
-    if (!file_) throw SystemError(path_ + ": cannot be written");
+    if (!file_) {
+      throw SystemError(path_ + ": cannot be written: " + std::generic_category().message(errno));
+    }
   }
 
   void remove() {

@@ -3,13 +3,13 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
-#include <bit>
 #include <cmath>
-#include <cstring>
-#include <limits>
 #include <numeric>
+#include <type_traits>
 
 #include "cameras/batch.h"
+#include "synth/dataset/nearest_line.h"
+#include "synth/dataset/npy.h"
 #include "synth/parallel.h"
 
 namespace dlsd {
@@ -154,117 +154,6 @@ class Centres {
   Bodies bodies_;
 };
 
-/// A straight piece of a label's curve.
-struct Piece {
-  Eigen::Vector2d from, along;  ///< along: to the other end.
-  double length2;
-  int label;
-
-  [[nodiscard]] Eigen::Vector2d nearest(const Eigen::Vector2d& p) const {
-    const double t = length2 > 0 ? std::clamp((p - from).dot(along) / length2, 0.0, 1.0) : 0.0;
-    return from + t * along;
-  }
-};
-
-struct Nearest {
-  Eigen::Vector2d point;
-  const Piece* piece;
-  double distance;
-};
-
-/// Finds the nearest piece for every pixel by halving the image: in a square of half diagonal r
-/// whose centre has the nearest piece at distance d, only pieces within d + 2 r of the centre can
-/// be the nearest of any of its points.
-class NearestPieces {
- public:
-  NearestPieces(int width, int height, const std::vector<LabelLine>& lines)
-      : width_(width), height_(height) {
-    for (const LabelLine& line : lines) {
-      for (size_t i = 1; i < line.points.size(); ++i) {
-        const Eigen::Vector2d d = line.points[i] - line.points[i - 1];
-        pieces_.push_back({line.points[i - 1], d, d.squaredNorm(), line.id});
-      }
-    }
-  }
-
-  /// Calls function(pixel, nearest) for all pixels; not at all if there are no pieces.
-  template <class Function>
-  void forEach(const Function& function) const {
-    if (pieces_.empty()) return;
-    std::vector<int> all(pieces_.size());
-    std::iota(all.begin(), all.end(), 0);
-    const int columns = (width_ + kBandRows - 1) / kBandRows;
-    forEachBand(height_, [&](int /*band*/, int first, int /*end*/) {
-      // What the whole band may need, then its squares.
-      const std::vector<int> of_band = candidates(
-          all, {(width_ - 1) / 2.0, first + (kBandRows - 1) / 2.0}, width_ - 1, kBandRows - 1);
-      for (int c = 0; c < columns; ++c) split(of_band, c * kBandRows, first, kBandRows, function);
-    });
-  }
-
- private:
-  static constexpr int kLeaf = 8;
-
-  [[nodiscard]] std::vector<int> candidates(const std::vector<int>& from,
-                                            const Eigen::Vector2d& centre,
-                                            double width,
-                                            double height) const {
-    std::vector<double> distances;
-    distances.reserve(from.size());
-    for (const int k : from) {
-      distances.push_back((pieces_[static_cast<size_t>(k)].nearest(centre) - centre).norm());
-    }
-    const double limit =
-        *std::min_element(distances.begin(), distances.end()) + std::hypot(width, height) + 1e-9;
-    std::vector<int> kept;
-    for (size_t i = 0; i < from.size(); ++i) {
-      if (distances[i] <= limit) kept.push_back(from[i]);
-    }
-    return kept;
-  }
-
-  template <class Function>
-  void split(
-      const std::vector<int>& from, int x0, int y0, int side, const Function& function) const {
-    if (x0 >= width_ || y0 >= height_) return;
-    const double half = (side - 1) / 2.0;
-    const std::vector<int> kept = candidates(from, {x0 + half, y0 + half}, side - 1, side - 1);
-    if (side > kLeaf) {
-      const int next = side / 2;
-      for (const int dy : {0, next}) {
-        for (const int dx : {0, next}) split(kept, x0 + dx, y0 + dy, next, function);
-      }
-      return;
-    }
-    for (int y = y0; y < std::min(height_, y0 + side); ++y) {
-      for (int x = x0; x < std::min(width_, x0 + side); ++x) {
-        const Eigen::Vector2d p(x, y);
-        // The first of equally near ones, so that the order of labels decides.
-        Nearest best{{0, 0}, nullptr, std::numeric_limits<double>::infinity()};
-        for (const int k : kept) {
-          const Piece& piece = pieces_[static_cast<size_t>(k)];
-          const Eigen::Vector2d q = piece.nearest(p);
-          const double distance = (q - p).norm();
-          if (distance < best.distance) best = {q, &piece, distance};
-        }
-        function(static_cast<size_t>(y) * static_cast<size_t>(width_) + static_cast<size_t>(x),
-                 best);
-      }
-    }
-  }
-
-  int width_, height_;
-  std::vector<Piece> pieces_;
-};
-
-/// Angle from x towards y, in [0, pi).
-float directionAngle(const Eigen::Vector2d& along) {
-  double angle = std::atan2(along.y(), along.x());
-  if (angle < 0) angle += M_PI;
-  const auto rounded = static_cast<float>(angle);
-  return rounded < static_cast<float>(M_PI) ? rounded : 0.0F;
-}
-
 }  // namespace
 
 std::string_view toString(PlaneKind kind) {
@@ -336,45 +225,33 @@ std::vector<Plane> renderPlanes(const Scene& scene,
     });
   }
   if (edge != nullptr || field != nullptr) {
-    NearestPieces(camera.width(), camera.height(), lines)
-        .forEach([&](size_t pixel, const Nearest& nearest) {
-          if (edge != nullptr && nearest.distance <= kEdgePlanePx) {
-            (*edge)[pixel] = nearest.piece->label;
-          }
-          if (field == nullptr) return;
-          float* out = field->data() + 4 * pixel;
-          out[0] = static_cast<float>(nearest.distance);
-          out[1] = directionAngle(nearest.piece->along);
-          out[2] = static_cast<float>(nearest.point.x());
-          out[3] = static_cast<float>(nearest.point.y());
-        });
+    const NearestLine nearest_line(lines);
+    const auto width = static_cast<size_t>(camera.width());
+    forEachBand(camera.height(), [&](int /*band*/, int first, int end) {
+      nearest_line.forEach(
+          0, first, camera.width(), end, [&](int x, int y, const NearestLine::Nearest& nearest) {
+            const size_t pixel = static_cast<size_t>(y) * width + static_cast<size_t>(x);
+            if (edge != nullptr && nearest.distance <= kEdgePlanePx) (*edge)[pixel] = nearest.label;
+            if (field == nullptr) return;
+            float* out = field->data() + 4 * pixel;
+            out[0] = static_cast<float>(nearest.distance);
+            out[1] = directionAngle(nearest.along);
+            out[2] = static_cast<float>(nearest.point.x());
+            out[3] = static_cast<float>(nearest.point.y());
+          });
+    });
   }
   return planes;
 }
 
 std::string encodeNpy(const Plane& plane) {
-  static_assert(std::endian::native == std::endian::little, "values are written as they are");
-  const bool is_float = std::holds_alternative<std::vector<float>>(plane.values);
-  std::string header = std::string("{'descr': '") + (is_float ? "<f4" : "<i4") +
-                       "', 'fortran_order': False, 'shape': (" + std::to_string(plane.height) +
-                       ", " + std::to_string(plane.width);
-  if (plane.channels > 1) header += ", " + std::to_string(plane.channels);
-  header += "), }";
-  // Magic, version and length take 10 bytes; the values start at a multiple of 64.
-  header.append(63 - (10 + header.size()) % 64, ' ');
-  header += '\n';
-  std::string bytes("\x93NUMPY\x01\x00", 8);
-  bytes += static_cast<char>(header.size() % 256);
-  bytes += static_cast<char>(header.size() / 256);
-  bytes += header;
-  std::visit(
+  std::vector<size_t> shape{static_cast<size_t>(plane.height), static_cast<size_t>(plane.width)};
+  if (plane.channels > 1) shape.push_back(static_cast<size_t>(plane.channels));
+  return std::visit(
       [&](const auto& values) {
-        const size_t start = bytes.size(), size = values.size() * sizeof(values[0]);
-        bytes.resize(start + size);
-        std::memcpy(bytes.data() + start, values.data(), size);
+        return npyBytes<typename std::decay_t<decltype(values)>::value_type>(shape, values);
       },
       plane.values);
-  return bytes;
 }
 
 }  // namespace dlsd

@@ -9,19 +9,6 @@
 #include "synth/dataset/json_fields.h"
 
 namespace dlsd {
-namespace {
-
-/// A path inside the folder that the manifest names: relative, and not out of the folder.
-std::string insidePath(const JsonField& field) {
-  const std::string path = field.text();
-  const std::filesystem::path p(path);
-  bool inside = p.is_relative();
-  for (const auto& part : p) inside = inside && part != "..";
-  if (!inside) field.fail("must be a path inside the data folder");
-  return path;
-}
-
-}  // namespace
 
 Dataset::Dataset(const std::string& folder) : folder_(folder) {
   namespace fs = std::filesystem;
@@ -35,12 +22,12 @@ Dataset::Dataset(const std::string& folder) : folder_(folder) {
   if (format.text() != kDatasetFormat)
     format.fail("must be \"" + std::string(kDatasetFormat) + "\"");
   for (const JsonField& camera : manifest["cameras"].array(1)) {
-    const std::string name = insidePath(camera["file"]);
+    const std::string name = camera["file"].insidePath();
     cameras_.emplace(name, loadCamera(folder + "/" + name));
   }
   for (const JsonField& frame : manifest["frames"].array()) {
     for (const char* key : {"image", "labels"}) {
-      const std::string file = insidePath(frame[key]);
+      const std::string file = frame[key].insidePath();
       if (!fs::exists(folder + "/" + file)) {
         throw InputError(folder + ": " + file + " is named in the manifest, but missing");
       }
@@ -54,20 +41,28 @@ Dataset::Dataset(const std::string& folder) : folder_(folder) {
 LabelRecord Dataset::labels(size_t i) const {
   const std::string path = folder_ + "/" + label_paths_.at(i);
   LabelRecord record = labelRecordFromJson(parseJson(readFile(path), path), path);
-  if (!cameras_.contains(record.camera)) {
+  checkRecord(record, path, image_paths_.at(i), cameras_);
+  return record;
+}
+
+void checkRecord(const LabelRecord& record,
+                 const std::string& path,
+                 const std::string& image,
+                 const std::map<std::string, Camera>& cameras) {
+  const auto it = cameras.find(record.camera);
+  if (it == cameras.end()) {
     throw InputError(path + ": camera = \"" + record.camera + "\" is not in the manifest");
   }
-  if (record.image != image_paths_.at(i)) {
-    throw InputError(path + ": image = \"" + record.image + "\" must be \"" + image_paths_[i] +
+  if (record.image != image) {
+    throw InputError(path + ": image = \"" + record.image + "\" must be \"" + image +
                      "\", as the manifest says");
   }
-  const Camera& cam = camera(record);
+  const Camera& cam = it->second;
   if (record.width != cam.width() || record.height != cam.height()) {
     throw InputError(path + ": width and height = " + std::to_string(record.width) + "x" +
                      std::to_string(record.height) + " must be those of the camera, " +
                      std::to_string(cam.width()) + "x" + std::to_string(cam.height()));
   }
-  return record;
 }
 
 const Camera& Dataset::camera(const LabelRecord& record) const {

@@ -41,6 +41,13 @@ class Dataset {
   std::map<std::string, Camera> cameras_;
 };
 
+/// Throws InputError if a record, read from `path`, is of another image than the manifest says or
+/// does not fit its camera, or its camera is not among `cameras` (by file).
+void checkRecord(const LabelRecord& record,
+                 const std::string& path,
+                 const std::string& image,
+                 const std::map<std::string, Camera>& cameras);
+
 /// sha256 of bytes, as 64 lower-case hexadecimal digits.
 [[nodiscard]] std::string sha256Hex(std::string_view bytes);
 

@@ -1,6 +1,7 @@
 #include "synth/dataset/json_fields.h"
 
 #include <cmath>
+#include <filesystem>
 
 #include "cameras/calibration/files.h"
 
@@ -71,6 +72,14 @@ std::string JsonField::text() const {
     fail("must be a text that is not empty");
   }
   return value_->get<std::string>();
+}
+
+std::string JsonField::insidePath() const {
+  const std::filesystem::path path(text());
+  bool inside = path.is_relative();
+  for (const auto& part : path) inside = inside && part != "..";
+  if (!inside) fail("must be a path inside the data folder");
+  return path.string();
 }
 
 Eigen::Vector2d JsonField::vector2() const {

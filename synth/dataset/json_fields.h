@@ -30,6 +30,8 @@ class JsonField {
   [[nodiscard]] int integer(int min, int max) const;
   [[nodiscard]] uint64_t counter() const;  ///< Integer in [0, 2^64).
   [[nodiscard]] std::string text() const;  ///< Not empty.
+  /// A relative path that does not lead out of its folder.
+  [[nodiscard]] std::string insidePath() const;
   [[nodiscard]] Eigen::Vector2d vector2() const;
   [[nodiscard]] Eigen::Vector3d vector3() const;
   /// A unit vector to 1e-6.

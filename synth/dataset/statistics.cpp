@@ -99,6 +99,26 @@ double curveLength(const std::vector<Eigen::Vector2d>& points) {
   return length;
 }
 
+std::vector<Eigen::Vector2d> equalArcPoints(const std::vector<Eigen::Vector2d>& points,
+                                            size_t count) {
+  const double total = curveLength(points);
+  std::vector<Eigen::Vector2d> out{points.front()};
+  size_t i = 1;
+  double before = 0, piece = (points[1] - points[0]).norm();
+  for (size_t k = 1; k + 1 < count; ++k) {
+    const double s = total * static_cast<double>(k) / static_cast<double>(count - 1);
+    while (i + 1 < points.size() && before + piece < s) {
+      before += piece;
+      ++i;
+      piece = (points[i] - points[i - 1]).norm();
+    }
+    const double t = piece > 0 ? std::min(1.0, (s - before) / piece) : 0;
+    out.emplace_back((1 - t) * points[i - 1] + t * points[i]);
+  }
+  out.push_back(points.back());
+  return out;
+}
+
 double LabelStatistics::crowdedShare() const {
   return share(crowded_lines, lines);
 }

@@ -12,6 +12,10 @@ namespace dlsd {
 /// Length of a polyline, px.
 [[nodiscard]] double curveLength(const std::vector<Eigen::Vector2d>& points);
 
+/// `count` >= 2 points of a polyline of two or more, at equal arc length, its ends included.
+[[nodiscard]] std::vector<Eigen::Vector2d> equalArcPoints(
+    const std::vector<Eigen::Vector2d>& points, size_t count);
+
 struct LabelStatistics {
   size_t frames = 0, lines = 0;
   double median_lines_per_frame = 0;
