@@ -132,7 +132,14 @@ std::string svgPoints(const std::vector<Vector2d>& points) {
   return out;
 }
 
-ordered_json frameJson(size_t index, const FrameEvaluation& frame) {
+/// Angle to the optical axis of the ray through the middle of a curve, degrees; nothing where there
+/// is no ray (a detection may reach out of the camera's domain).
+std::string fieldAngleText(const Camera& camera, const std::vector<Vector2d>& points) {
+  const auto ray = camera.unproject(equalArcPoints(points, 3)[1]);
+  return ray ? fmt::format("{:.1f}", fieldAngle(*ray) * 180 / M_PI) : "";
+}
+
+ordered_json frameJson(size_t index, const FrameEvaluation& frame, const Camera& camera) {
   const FrameOutcome& outcome = frame.outcome;
   ordered_json labels = ordered_json::array();
   for (size_t i = 0; i < frame.labels.lines.size(); ++i) {
@@ -148,12 +155,14 @@ ordered_json frameJson(size_t index, const FrameEvaluation& frame) {
          {"length", fmt::format("{:.1f}", line.length_px)},
          {"angle", fmt::format("{:.1f}", line.angle_rad * 180 / M_PI)},
          {"contrast", fmt::format("{:.0f}", line.contrast)},
+         {"field", fieldAngleText(camera, line.points)},
          {"ends", fmt::format("{}, {}", toString(line.ends[0]), toString(line.ends[1]))},
          {"found", found},
          {"points", svgPoints(line.points)}});
   }
   ordered_json detections = ordered_json::array();
   for (size_t i = 0; i < frame.detections.lines.size(); ++i) {
+    const std::vector<Vector2d>& points = frame.detections.lines[i].points;
     unsigned right = 0, merged = 0;
     ordered_json coverage = ordered_json::array();
     for (size_t r = 0; r < outcome.detections.size(); ++r) {
@@ -166,7 +175,9 @@ ordered_json frameJson(size_t index, const FrameEvaluation& frame) {
                    {"right", right},
                    {"merged", merged},
                    {"coverage", std::move(coverage)},
-                   {"points", svgPoints(frame.detections.lines[i].points)}};
+                   {"length", fmt::format("{:.1f}", curveLength(points))},
+                   {"field", fieldAngleText(camera, points)},
+                   {"points", svgPoints(points)}};
     if (frame.detections.lines[i].score) {
       j["score"] = fmt::format("{:.1f}", *frame.detections.lines[i].score);
     }
@@ -392,10 +403,11 @@ Report writeReport(const Dataset& dataset,
                        page.found += {frame.outcome.labels.back()[i].found ? 1 : 0, 1};
                      }
                    }
+                   const Camera& camera = dataset.camera(frame.labels);
                    page.script =
-                       "dlsdFrame(" + scriptJson(frameJson(frames.size(), frame)) + ");\n";
+                       "dlsdFrame(" + scriptJson(frameJson(frames.size(), frame, camera)) + ");\n";
                    page.thumbnail_png = encodePng(thumbnail(dataset.image(frame.labels)));
-                   summary.add(frame, dataset.camera(frame.labels));
+                   summary.add(frame, camera);
                    frames.push_back(std::move(page));
                    records.push_back(std::move(frame.labels));
                  });

@@ -38,6 +38,8 @@ dd { margin: 0; font-size: 20px; font-variant-numeric: tabular-nums; }
 #viewer header label { display: inline-flex; align-items: center; gap: 6px; cursor: pointer; }
 #viewer header label[hidden] { display: none; }
 #viewer button, #viewer select { font: inherit; color: inherit; background: var(--bg); border: 1px solid var(--line); border-radius: 6px; padding: 3px 11px; cursor: pointer; }
+#viewer .filters { display: inline-flex; flex-wrap: wrap; align-items: center; gap: 6px 14px; }
+#viewer .filters input { width: 4.6em; font: inherit; color: inherit; background: var(--bg); border: 1px solid var(--line); border-radius: 6px; padding: 2px 5px; }
 #viewer .title { font-weight: 600; }
 #viewer .title small { font-weight: 400; }
 #viewer .right { margin-left: auto; display: flex; gap: 8px; align-items: center; }
@@ -64,6 +66,12 @@ const std::string_view kReportViewer = R"html(
 <label class="needs-detections"><input type="checkbox" id="show-misses" checked>misses</label>
 <label class="needs-detections"><input type="checkbox" id="show-false-alarms" checked>false alarms</label>
 <label class="needs-detections">&rho; <select id="rho"></select></label>
+<span class="filters" role="group" aria-label="Filters">
+<label title="Labels of less contrast are hidden; detections have none">contrast &ge; <input type="number" id="min-contrast" min="0" max="255" value="0"></label>
+<label title="Shorter curves are hidden">length &ge; <input type="number" id="min-length" min="0" value="0"> px</label>
+<label title="Angle to the optical axis at the middle of the curve">field angle <input type="number" id="min-field" min="0" max="180" value="0"> to <input type="number" id="max-field" min="0" max="180" value="180">&deg;</label>
+<button id="no-filters" title="All curves">Reset</button>
+</span>
 <span class="right"><button id="previous" title="Left arrow">&larr;</button><button id="next" title="Right arrow">&rarr;</button><button id="fit" title="Double click">Fit</button><button id="close" title="Escape">Close</button></span>
 </header>
 <div id="stage"></div>
@@ -99,35 +107,45 @@ function draw() {
   const root = svg("svg", {preserveAspectRatio: "xMidYMid meet"}, stage);
   setView(root);
   svg("image", {href: report.frames[current].image, x: -0.5, y: -0.5, width: frame.width, height: frame.height}, root);
-  const count = {};
-  const add = (key, on, points, cls, tip) => { count[key] = (count[key] || 0) + 1; if (on) polyline(points, cls, tip, root); };
+  const count = {}, all = {};
+  const limit = (id, otherwise) => byId(id).value === "" ? otherwise : Number(byId(id).value);
+  const contrast = limit("min-contrast", 0), length = limit("min-length", 0);
+  const nearest = limit("min-field", 0), farthest = limit("max-field", 180);
+  const passes = l => !(l.contrast < contrast) && l.length >= length && (l.field === "" || (l.field >= nearest && l.field <= farthest));
+  const add = (key, on, l, cls, tip) => {
+    all[key] = (all[key] || 0) + 1;
+    if (!passes(l)) return;
+    count[key] = (count[key] || 0) + 1;
+    if (on) polyline(l.points, cls, tip, root);
+  };
   const on = name => byId("show-" + name).checked;
   for (const l of frame.labels) {
     const found = report.hasDetections ? (l.found & bit ? ", found" : ", missed") : "";
-    add(l.kind, on("labels"), l.points, l.kind, `label ${l.id}: ${l.kind}, ${l.stratum}, ${l.length} px, ${l.angle} deg, contrast ${l.contrast}, ends ${l.ends}${found}`);
+    add(l.kind, on("labels"), l, l.kind, `label ${l.id}: ${l.kind}, ${l.stratum}, ${l.length} px, ${l.angle} deg, contrast ${l.contrast}, field angle ${l.field} deg, ends ${l.ends}${found}`);
   }
   if (report.hasDetections) {
     for (const d of frame.detections) {
       const tip = `detection ${d.index}: ${d.coverage[byId("rho").selectedIndex]} % on its best carrier` + (d.score === undefined ? "" : `, score ${d.score}`);
-      if (d.merged & bit) add("merged", on("detections"), d.points, "merged-line", tip + ", merged");
-      else if (d.right & bit) add("right", on("detections"), d.points, "right-line", tip + ", right");
-      else add("wrong", on("false-alarms"), d.points, "false-alarm", tip + ", wrong");
+      if (d.merged & bit) add("merged", on("detections"), d, "merged-line", tip + ", merged");
+      else if (d.right & bit) add("right", on("detections"), d, "right-line", tip + ", right");
+      else add("wrong", on("false-alarms"), d, "false-alarm", tip + ", wrong");
     }
     for (const l of frame.labels) {
       if (l.found & bit) continue;
       const headline = l.stratum === "headline";
-      add(headline ? "missed" : "missed-other", on("misses"), l.points, headline ? "miss" : "miss other", `missed label ${l.id}: ${l.kind}, ${l.stratum}, ${l.length} px, ${l.angle} deg, contrast ${l.contrast}`);
+      add(headline ? "missed" : "missed-other", on("misses"), l, headline ? "miss" : "miss other", `missed label ${l.id}: ${l.kind}, ${l.stratum}, ${l.length} px, ${l.angle} deg, contrast ${l.contrast}`);
     }
   }
   const legend = byId("legend");
   legend.replaceChildren();
   const entry = (shown, key, cls, text) => {
-    if (!shown || !count[key]) return;
+    if (!shown || !all[key]) return;
     const item = document.createElement("span"), swatch = document.createElement("i");
     const probe = svg("polyline", {class: cls}, root);
     swatch.style.background = getComputedStyle(probe).stroke;
     probe.remove();
-    item.append(swatch, `${text} ${count[key]}`);
+    const passed = count[key] || 0;
+    item.append(swatch, passed < all[key] ? `${text} ${passed} of ${all[key]}` : `${text} ${passed}`);
     legend.append(item);
   };
   for (const kind of ["crease", "silhouette", "material", "wire", "shadow"]) entry(on("labels"), kind, kind, kind);
@@ -181,7 +199,11 @@ report.rho.forEach(rho => byId("rho").add(new Option(`${rho} px`)));
 byId("rho").selectedIndex = report.rho.length - 1;
 byId("show-labels").checked = !report.hasDetections;
 document.querySelectorAll(".needs-detections").forEach(e => { e.hidden = !report.hasDetections; });
-viewer.querySelectorAll("input, select").forEach(e => e.addEventListener("change", () => { if (loaded.has(current)) draw(); }));
+viewer.querySelectorAll("input, select").forEach(e => e.addEventListener("input", () => { if (loaded.has(current)) draw(); }));
+byId("no-filters").onclick = () => {
+  viewer.querySelectorAll(".filters input").forEach(e => { e.value = e.defaultValue; });
+  if (loaded.has(current)) draw();
+};
 byId("previous").onclick = () => step(-1);
 byId("next").onclick = () => step(1);
 byId("close").onclick = () => { location.hash = ""; };
@@ -190,7 +212,8 @@ byId("fit").onclick = fit;
 stage.ondblclick = fit;
 addEventListener("hashchange", route);
 addEventListener("keydown", event => {
-  if (current < 0 || event.target.tagName === "SELECT") return;
+  if (current < 0) return;
+  if (event.key !== "Escape" && (event.target.tagName === "SELECT" || event.target.type === "number")) return;
   if (event.key === "Escape") location.hash = "";
   else if (event.key === "ArrowLeft") step(-1);
   else if (event.key === "ArrowRight") step(1);

@@ -3,7 +3,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <filesystem>
+#include <nlohmann/json.hpp>
 
 #include "evaluation/hand_made.h"
 
@@ -53,6 +55,25 @@ TEST_F(ReportTest, PageHasAFrameEachAndTheSummary) {
   EXPECT_THAT(readFile(data + "/gallery/frames/000000.js"), HasSubstr(R"("found":7)"));
   EXPECT_THAT(readFile(data + "/gallery/frames/000001.js"), HasSubstr(R"("found":0)"));
   EXPECT_TRUE(fs::exists(data + "/gallery/thumbs/000002.png"));
+}
+
+// The viewer filters by these numbers.
+TEST_F(ReportTest, CurvesHaveLengthContrastAndFieldAngle) {
+  (void)write(data + "/gallery");
+  std::string script = readFile(data + "/gallery/frames/000000.js");
+  script = script.substr(script.find('(') + 1);
+  const auto frame = nlohmann::json::parse(script.substr(0, script.rfind(')')));
+  // From (100, 199.5) to (300, 199.5), focal length 400 px, principal point (320, 240).
+  const double field = std::atan(std::hypot(120, 40.5) / 400) * 180 / M_PI;
+  for (const char* key : {"labels", "detections"}) {
+    SCOPED_TRACE(key);
+    ASSERT_EQ(frame.at(key).size(), 1U);
+    const auto& curve = frame.at(key).at(0);
+    EXPECT_EQ(curve.at("length"), "200.0");
+    EXPECT_NEAR(std::stod(curve.at("field").get<std::string>()), field, 0.11);
+  }
+  EXPECT_EQ(frame.at("labels").at(0).at("contrast"), "50");
+  EXPECT_FALSE(frame.at("detections").at(0).contains("contrast"));
 }
 
 TEST_F(ReportTest, TextIsEscapedAndNothingComesFromElsewhere) {

@@ -5,6 +5,8 @@
 #include <limits>
 #include <numeric>
 
+#include "synth/dataset/statistics.h"
+
 namespace dlsd {
 
 using Eigen::Vector2d;
@@ -21,23 +23,9 @@ void scale(StructuralCurve& curve, int width, int height) {
 }  // namespace
 
 StructuralCurve structuralCurve(const std::vector<Vector2d>& polyline, int width, int height) {
-  std::vector<double> length_to{0};
-  for (size_t i = 1; i < polyline.size(); ++i) {
-    length_to.push_back(length_to.back() + (polyline[i] - polyline[i - 1]).norm());
-  }
   StructuralCurve curve;
-  curve.front() = polyline.front();
-  curve.back() = polyline.back();
-  size_t i = 1;
-  for (size_t k = 1; k + 1 < kStructuralPoints; ++k) {
-    const double s = length_to.back() * double(k) / double(kStructuralPoints - 1);
-    while (i + 1 < polyline.size() && length_to[i] < s) {
-      ++i;
-    }
-    const double piece = length_to[i] - length_to[i - 1];
-    const double t = piece > 0 ? (s - length_to[i - 1]) / piece : 0;
-    curve[k] = (1 - t) * polyline[i - 1] + t * polyline[i];
-  }
+  const std::vector<Vector2d> points = equalArcPoints(polyline, kStructuralPoints);
+  std::copy(points.begin(), points.end(), curve.begin());
   scale(curve, width, height);
   return curve;
 }

@@ -134,11 +134,13 @@ def decode_png(data, path="png"):
     """PNG (ISO 15948) of 8 or 16 bit, grey or colour, not interlaced and without a palette."""
     if data[:8] != b"\x89PNG\r\n\x1a\n":
         raise ValueError(f"{path}: not a PNG file")
-    at, packed, header = 8, b"", None
-    while at < len(data):
+    at, packed, header, kind = 8, b"", None, b""
+    while kind != b"IEND":
+        if at + 12 > len(data):
+            raise ValueError(f"{path}: truncated")
         length, kind = struct.unpack(">I4s", data[at : at + 8])
-        body = data[at + 8 : at + 8 + length]
-        if zlib.crc32(kind + body) != struct.unpack(">I", data[at + 8 + length : at + 12 + length])[0]:
+        body, checksum = data[at + 8 : at + 8 + length], data[at + 8 + length : at + 12 + length]
+        if checksum != struct.pack(">I", zlib.crc32(kind + body)):
             raise ValueError(f"{path}: damaged")
         if kind == b"IHDR":
             header = struct.unpack(">IIBBBBB", body)

@@ -10,10 +10,11 @@ std::string npyBytes(std::string_view type,
                      std::span<const size_t> shape,
                      std::span<const std::byte> values) {
   std::string header = "{'descr': '" + std::string(type) + "', 'fortran_order': False, 'shape': (";
-  for (size_t k = 0; k < shape.size(); ++k) {
-    header += (k == 0 ? "" : " ") + std::to_string(shape[k]) +
-              (k + 1 < shape.size() || k == 0 ? "," : "");
+  for (const size_t n : shape) {
+    header += std::to_string(n);
+    header += ", ";
   }
+  if (shape.size() > 1) header.resize(header.size() - 2);
   header += "), }";
   // Magic, version and length take 10 bytes; the values start at a multiple of 64.
   header.append(63 - (10 + header.size()) % 64, ' ');

@@ -81,15 +81,12 @@ Image greyOf(const Image& image) {
 Image networkImage(const Image& image_in) {
   Image grey = greyOf(image_in);
   const cv::Mat from(grey.height, grey.width, CV_8U, grey.bytes.data());
-  cv::Mat small;
-  // Both keep the corners where they are. Enlarging has nothing to take means of.
-  const bool smaller = grey.width >= kNetworkImagePx && grey.height >= kNetworkImagePx;
-  cv::resize(from,
-             small,
-             {kNetworkImagePx, kNetworkImagePx},
-             0,
-             0,
-             smaller ? cv::INTER_AREA : cv::INTER_LINEAR);
+  // Both keep the corners where they are. Means where it gets smaller; enlarging has none to take.
+  cv::Mat less, small;
+  const cv::Size size(std::min(grey.width, kNetworkImagePx),
+                      std::min(grey.height, kNetworkImagePx));
+  cv::resize(from, less, size, 0, 0, cv::INTER_AREA);
+  cv::resize(less, small, {kNetworkImagePx, kNetworkImagePx}, 0, 0, cv::INTER_LINEAR);
   Image image{kNetworkImagePx, kNetworkImagePx, 3, 8, {}};
   image.bytes.reserve(3 * small.total());
   for (int y = 0; y < small.rows; ++y) {

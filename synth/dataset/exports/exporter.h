@@ -75,7 +75,7 @@ class TextStream {
 /// 8 bit, one channel.
 [[nodiscard]] Image greyOf(const Image& image);
 /// Three equal channels of 8 bit at 512 x 512: networks take the first three of what they read.
-/// Every pixel is the mean of what it covers.
+/// Where that is smaller, pixels are means of what they cover.
 inline constexpr int kNetworkImagePx = 512;
 [[nodiscard]] Image networkImage(const Image& image);
 /// The flips of training data, by the number in their file names.
