@@ -5,6 +5,7 @@ the exports are made; formulas are the formats' and the cameras' own."""
 import contextlib
 import glob
 import hashlib
+import io
 import json
 import os
 import re
@@ -518,6 +519,20 @@ class WebDataset(Export):
                 if NAMES[i % 3] == "fov":
                     self.assertEqual(calibration["model"], "fov")
                     self.assertEqual(calibration["params"]["omega"], 0.93)
+
+    def test_planes(self):
+        run("generate", "--camera", "fov.yaml", "--count", 2, "--planes", "depth,df", "--out", "planes",
+            cwd=self.folder)  # fmt: skip
+        out = self.export("webdataset", "--split", "1,0,0", data="planes")
+        keys, samples = self.samples(out, "train")
+        self.assertEqual(keys, ["000000", "000001"])
+        for key, sample in zip(keys, samples):
+            self.assertEqual(set(sample), {"json", "png", "depth.npy", "df.npy"})
+            for kind, shape in (("depth", (120, 160)), ("df", (120, 160, 4))):
+                with open(f"{self.folder}/planes/planes/{kind}/{key}.npy", "rb") as file:
+                    self.assertEqual(sample[kind + ".npy"], file.read())
+                plane = np.load(io.BytesIO(sample[kind + ".npy"]))
+                self.assertEqual((plane.shape, plane.dtype), (shape, np.float32))
 
     def test_shards(self):
         out = self.export("webdataset", "--shard-size", 1, "--split", "1,0,0", data="data")

@@ -26,7 +26,7 @@ class Reader(unittest.TestCase):
                 file.write(text)
         cls.data = cls.folder + "/data"
         run("generate", "--camera", "wide.yaml", "--camera", "straight.yaml", "--count", FRAMES,
-            "--out", "data", cwd=cls.folder)  # fmt: skip
+            "--planes", "depth", "--out", "data", cwd=cls.folder)  # fmt: skip
 
     @classmethod
     def tearDownClass(cls):
@@ -56,6 +56,8 @@ class Reader(unittest.TestCase):
                         projected = point[:2] / point[2] * (p["fx"], p["fy"]) + (p["cx"], p["cy"])
                         np.testing.assert_allclose(projected, pixel, atol=1e-5)
             self.assertEqual(frame.cam_from_world.shape, (4, 4))
+            self.assertEqual(frame.plane("depth").shape, image.shape)
+            self.assertTrue(np.all(frame.plane("depth") >= 0))
 
     def test_splits_are_those_of_the_export(self):
         run("export", "--format", "coco-line", "--data", "data", "--out", "coco", cwd=self.folder)

@@ -32,10 +32,11 @@ struct ExportFrame {
 class Exporter {
  public:
   virtual ~Exporter() = default;
-  /// Returns whether the frame was written. If not, exporter's notes() say why.
+  /// Returns whether the frame was written. If not, notes() tell why.
   virtual bool add(const ExportFrame& frame) = 0;
   /// Writes what comes last.
   virtual void finish() = 0;
+  /// What was left out or is not exact, and why: sentences.
   [[nodiscard]] virtual std::vector<std::string> notes() const = 0;
 };
 

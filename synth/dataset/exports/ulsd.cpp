@@ -50,11 +50,8 @@ std::vector<std::array<Vector2d, 2>> endsBelow90(const Camera& camera, const Lab
   const std::array<Vector2d, 2> whole{line.points.front(), line.points.back()};
   const auto arc = arcBetween(line.points_in_cam[0], line.points_in_cam[1]);
   if (!arc) return {whole};
-  const Camera front(camera.model(),
-                     camera.width(),
-                     camera.height(),
-                     std::min(kMaxFisheyeAngle, camera.maxFieldAngleLimit()));
   if (camera.maxFieldAngle() <= kMaxFisheyeAngle) return {whole};
+  const Camera front(camera.model(), camera.width(), camera.height(), kMaxFisheyeAngle);
   std::vector<std::array<Vector2d, 2>> parts;
   const auto end = [&](double t, ImageEnd kind) {
     if (kind == ImageEnd::kRim) {
@@ -217,8 +214,10 @@ class UlsdExporter : public Exporter {
     std::vector<std::string> notes;
     if (empty_ > 0) notes.push_back(counted(empty_, "frame") + " without lines left out");
     if (wordless_ > 0) {
-      notes.push_back(counted(wordless_, "frame") +
-                      " not among the raw ones, ULSD has no model for their camera; npz are there");
+      notes.push_back(
+          counted(wordless_, "frame") +
+          " not among the raw ones (no line below 90 degrees, or a camera that ULSD has "
+          "no model for); npz are there");
     }
     if (cut_ > 0) {
       notes.push_back(counted(cut_, "line") +
