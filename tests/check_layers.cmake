@@ -40,7 +40,7 @@ rule(FILES "^detector/" EXCEPT "opencv_adaptor|_test\\.cpp$|^detector/examples/"
 rule(FILES "^evaluation/" FORBIDDEN "\"(properties|cli)/|\"synth/[^d]|\"synth/d[^a]" WHY "evaluation reads datasets and does not render")
 rule(FILES "." EXCEPT "^synth/raycaster\\.cpp$" FORBIDDEN "embree" WHY "only synth/raycaster.cpp knows Embree")
 rule(FILES "\\.h$" EXCEPT "opencv_adaptor|^properties/|^cli/" FORBIDDEN "opencv2" WHY "OpenCV stands in no public header")
-rule(FILES "." EXCEPT "^properties/|_test\\.cpp$" FORBIDDEN "rapidcheck|gtest|gmock" WHY "test libraries stay in tests")
+rule(FILES "." EXCEPT "^properties/|_test\\.cpp$|_fixture\\.h$" FORBIDDEN "rapidcheck|gtest|gmock" WHY "test libraries stay in tests")
 rule(FILES "^properties/checks/" FORBIDDEN "rapidcheck|gtest|gmock" WHY "predicates are used by dlsd replay too")
 rule(FILES "^(cameras|synth|detector|evaluation|cli)/" FORBIDDEN "\"properties/[^c]|\"properties/c[^h]"
      WHY "nothing depends on the suites; properties/checks alone may be used, by cli")
