@@ -632,20 +632,45 @@ std::optional<TracedLine> LineTracer::trace(const PlanarPiece& piece,
   if (!cutBoth()) return std::nullopt;
 
   // Near its ends an edge meets others, which move it: a line that has enough points is fitted
-  // without, and then again with what agrees.
+  // without, and then again with what agrees. Where the end turns away, another edge begins.
   constexpr size_t kEnoughQuads = 7;
-  const size_t last = quads_.size() - 1;
-  size_t begin = 0, end = quads_.size();
-  if (end >= kEnoughQuads) {
-    begin = rowsOfEnd(last, 0) > 2 ? 1 : 2;
-    end -= rowsOfEnd(0, last) > 2 ? 1 : 2;
+  constexpr double kStrayPx2 = 0.35 * 0.35;
+  size_t last = 0, begin = 0, end = 0;
+  std::optional<PlaneFit> fit;
+  for (int pass = 0; pass < 2; ++pass) {
+    last = quads_.size() - 1;
+    begin = 0;
+    end = quads_.size();
+    if (end >= kEnoughQuads) {
+      begin = rowsOfEnd(last, 0) > 2 ? 1 : 2;
+      end -= rowsOfEnd(0, last) > 2 ? 1 : 2;
+    }
+    moments_ = {};
+    points_ = 0;
+    for (size_t i = begin; i < end; ++i) add(quads_[i]);
+    if (points_ < 2) return std::nullopt;
+    fit = fitPlane(moments_);
+    if (!fit) return std::nullopt;
+    if (pass == 1) break;
+    const auto strays = [&](const Quad& q) {
+      const Eigen::Vector3d ray = q.ray + static_cast<double>(q.offset_px) * q.across;
+      const double across_px = ray.dot(fit->normal) / q.across.dot(fit->normal);
+      return across_px * across_px > std::max(9 * static_cast<double>(q.variance_px2), kStrayPx2);
+    };
+    const size_t size = quads_.size();
+    while (quads_.size() > 4 && strays(quads_.back())) {
+      quads_.pop_back();
+      front.at_border = false;
+    }
+    size_t cut_off = 0;
+    while (quads_.size() > 4 + cut_off && strays(quads_[cut_off])) ++cut_off;
+    if (cut_off > 0) {
+      quads_.erase(quads_.begin(), quads_.begin() + static_cast<ptrdiff_t>(cut_off));
+      back.at_border = false;
+    }
+    if (quads_.size() == size) break;
+    if (!cutBoth()) return std::nullopt;
   }
-  moments_ = {};
-  points_ = 0;
-  for (size_t i = begin; i < end; ++i) add(quads_[i]);
-  if (points_ < 2) return std::nullopt;
-  auto fit = fitPlane(moments_);
-  if (!fit) return std::nullopt;
   const auto agrees = [&](const Quad& q, bool is_whole) {
     const Eigen::Vector3d ray = q.ray + static_cast<double>(q.offset_px) * q.across;
     const double across_px = ray.dot(fit->normal) / q.across.dot(fit->normal);
