@@ -162,7 +162,8 @@ LineErrors detectIsolatedLine(const IsolatedLine& line, uint64_t seed) {
     from = corners[0];
     to = corners[1];
   } else {
-    if (line.distorted) centre += 0.25 * size * across;
+    // Farther out the camera would see more than half a great circle, which is no line.
+    if (line.distorted) centre += 0.15 * size * across;
     // Two of its points; where it meets the border is found below.
     const Vector2d step = 0.2 * size * along;
     planes.push_back(

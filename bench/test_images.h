@@ -16,7 +16,7 @@ using Pixels = std::vector<uint8_t>;
 /// A step edge, alone in its image but for the corners at its ends.
 struct IsolatedLine {
   double length_px, contrast, noise, blur_px;  ///< Grey levels; blur of the optics, sigma.
-  bool distorted;    ///< Seen by a FoV camera, about a quarter of the image off its centre.
+  bool distorted;    ///< Seen by a FoV camera, off its centre by 15 % of the image.
   bool has_corners;  ///< A side of a square; else it runs from border to border.
 };
 

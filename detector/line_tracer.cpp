@@ -625,7 +625,7 @@ std::optional<TracedLine> LineTracer::trace(const PlanarPiece& piece,
     wide += std::abs(static_cast<double>(q.mean.odd_wide));
   }
   if (!(wide <= static_cast<double>(kMaxWideRatio) * narrow)) return std::nullopt;
-  TracedLine line;
+  TracedLine line{};
   line.score = scoreOf();
   if (!(line.score >= options_.min_score)) return std::nullopt;
   refine();
@@ -651,6 +651,8 @@ std::optional<TracedLine> LineTracer::trace(const PlanarPiece& piece,
     if (points_ < 2) return std::nullopt;
     fit = fitPlane(moments_);
     if (!fit) return std::nullopt;
+    // Of the whole: without its ends an arc may pass for a line.
+    line.is_arc = line.is_arc || (options_.min_bend_radius_px > 0 && isArc(fit->normal));
     if (pass == 1) break;
     const auto strays = [&](const Quad& q) {
       const Eigen::Vector3d ray = q.ray + static_cast<double>(q.offset_px) * q.across;
@@ -712,7 +714,6 @@ std::optional<TracedLine> LineTracer::trace(const PlanarPiece& piece,
   // Few residuals say little: the measured noise counts as kPriorPoints of them.
   constexpr double kPriorPoints = 4;
   line.variance_factor = (chi2 + kPriorPoints) / (points_ - 2 + kPriorPoints);
-  line.is_arc = options_.min_bend_radius_px > 0 && isArc(fit->normal);
   line.polarity = side < 0 ? -1 : 1;
   const End from = endOf(last, 0, back.at_border);
   const End to = endOf(0, last, front.at_border);
