@@ -187,6 +187,59 @@ TEST_F(DatasetEvaluation, BuiltInDetectorFindsAStep) {
             "detector \"lsd\" is unknown, there are dlsd, dlsd-paper");
 }
 
+TEST_F(DatasetEvaluation, BezierPointsAreJoinedByTheirCurve) {
+  // A parabola, and three points on it: the chords between them are up to 2.5 px off.
+  LabelLine parabola = label(pinholeCamera(), {100, 200}, {300, 200}, 0);
+  parabola.points.clear();
+  for (int k = 0; k <= 100; ++k) {
+    parabola.points.emplace_back(100 + 2 * k, 200 + 40 * 0.01 * k * (1 - 0.01 * k));
+  }
+  writeDataset(data, {{parabola}});
+  const Dataset dataset(data);
+  std::vector<Eigen::Vector2d> points{{100, 200}, {200, 210}, {300, 200}};
+  const auto run = [&](bool bezier) {
+    EvaluationOptions options;
+    options.bezier = bezier;
+    std::optional<FrameEvaluation> result;
+    evaluateFrames(
+        dataset,
+        detectionsOfFile(dataset, write({record("000000.png", {hand_made::detection(points)})})),
+        options,
+        1,
+        [&](FrameEvaluation&& frame) { result = std::move(frame); });
+    return *result;
+  };
+  const FrameEvaluation polyline = run(false), bezier = run(true);
+  EXPECT_FALSE(polyline.outcome.labels[0][0].found);
+  EXPECT_TRUE(bezier.outcome.labels[0][0].found);
+  EXPECT_LE(bezier.outcome.errors.at(0)->sum_px / double(bezier.outcome.errors[0]->samples), 0.02);
+  EXPECT_EQ(bezier.structure[kCurveAll].detections.at(0).matches[0], StructuralMatch::kTrue);
+  points.resize(9, {10, 10});
+  EXPECT_EQ(message([&] { (void)run(true); }),
+            "images/000000.png: detection 0 has 9 points, a Bezier curve passes through 2 to 8");
+}
+
+TEST_F(DatasetEvaluation, StructureCountsClearLabelsApart) {
+  auto labels = exampleLabels(1);
+  labels[0][1].contrast = 3;
+  writeDataset(data, labels);
+  const Dataset dataset(data);
+  const std::string path =
+      write({record("000000.png", {shifted(labels[0][0], {0, 1}), shifted(labels[0][1], {0, 1})})});
+  evaluateFrames(dataset, detectionsOfFile(dataset, path), {}, 1, [&](FrameEvaluation&& frame) {
+    for (const auto& [kind, counting] :
+         {std::pair(kCurveAll, 2L), {kCurveClear, 1L}, {kChordAll, 2L}, {kChordClear, 1L}}) {
+      const StructuralOutcome& outcome = frame.structure[kind];
+      EXPECT_EQ(outcome.labels, counting);
+      ASSERT_EQ(outcome.detections.size(), 2U);
+      // The longer line comes first, there being no scores.
+      EXPECT_EQ(outcome.detections[0].matches[0], StructuralMatch::kTrue);
+      EXPECT_EQ(outcome.detections[1].matches[0],
+                counting == 2 ? StructuralMatch::kTrue : StructuralMatch::kIgnored);
+    }
+  });
+}
+
 TEST_F(DatasetEvaluation, ErrorsNameTheFirstBadFrame) {
   const auto labels = exampleLabels(6);
   writeDataset(data, labels);

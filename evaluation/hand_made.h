@@ -13,6 +13,7 @@
 #include "cameras/calibration/calibration.h"
 #include "cameras/calibration/files.h"
 #include "cameras/camera.h"
+#include "evaluation/dataset_evaluation.h"
 #include "synth/dataset/dataset.h"
 #include "synth/dataset/records.h"
 
@@ -66,6 +67,20 @@ inline DetectionLine shifted(const LabelLine& label, const Eigen::Vector2d& shif
 inline DetectionLine reversed(DetectionLine line) {
   std::reverse(line.points.begin(), line.points.end());
   return line;
+}
+
+/// A frame evaluated as evaluateFrames does, but for sAP.
+inline FrameEvaluation frame(const std::string& camera_name,
+                             const Camera& camera,
+                             const std::vector<LabelLine>& labels,
+                             const std::vector<DetectionLine>& detections) {
+  FrameEvaluation result;
+  result.labels.camera = "cameras/" + camera_name + ".yaml";
+  result.labels.lines = labels;
+  result.labels.sensor = nlohmann::ordered_json::object();
+  result.detections.lines = detections;
+  result.outcome = evaluateFrame(camera, labels, detections, EvaluationOptions{});
+  return result;
 }
 
 /// A fresh empty folder below the system's temporary one, removed at the end.

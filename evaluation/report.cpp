@@ -8,7 +8,9 @@
 #include <utility>
 
 #include "cameras/calibration/files.h"
+#include "evaluation/picture.h"
 #include "evaluation/report_page.h"
+#include "evaluation/svg_plot.h"
 #include "synth/dataset/image.h"
 
 namespace dlsd {
@@ -19,32 +21,6 @@ using Eigen::Vector2d;
 using nlohmann::ordered_json;
 
 constexpr int kThumbnailPx = 320;
-
-std::string escapedHtml(std::string_view text) {
-  std::string out;
-  for (const char c : text) {
-    switch (c) {
-      case '&':
-        out += "&amp;";
-        break;
-      case '<':
-        out += "&lt;";
-        break;
-      case '>':
-        out += "&gt;";
-        break;
-      case '"':
-        out += "&quot;";
-        break;
-      case '\'':
-        out += "&#39;";
-        break;
-      default:
-        out += c;
-    }
-  }
-  return out;
-}
 
 /// JSON that may stand in a script element: no "<" that could end it.
 std::string scriptJson(const ordered_json& json) {
@@ -64,43 +40,6 @@ std::string urlOf(const std::string& path) {
     out += plain ? std::string(1, c) : fmt::format("%{:02X}", static_cast<unsigned char>(c));
   }
   return out;
-}
-
-/// The image made smaller by a whole factor: means of blocks.
-Image thumbnail(const Image& image) {
-  const int factor = std::max(1, (image.width + kThumbnailPx - 1) / kThumbnailPx);
-  if (factor == 1 || image.height < factor) {
-    return image;
-  }
-  Image small;
-  small.width = image.width / factor;
-  small.height = image.height / factor;
-  small.channels = image.channels;
-  small.bytes.reserve(size_t(small.width) * size_t(small.height) * size_t(small.channels));
-  const int bytes = image.bits / 8;
-  const auto valueAt = [&](int x, int y, int channel) -> unsigned {
-    const size_t i =
-        (size_t(y) * size_t(image.width) + size_t(x)) * size_t(image.channels) + size_t(channel);
-    if (bytes == 1) {
-      return image.bytes[i];
-    }
-    uint16_t value = 0;
-    std::copy_n(image.bytes.begin() + long(2 * i), 2, reinterpret_cast<uint8_t*>(&value));
-    return value / 257;
-  };
-  for (int y = 0; y < small.height; ++y) {
-    for (int x = 0; x < small.width; ++x) {
-      for (int c = 0; c < small.channels; ++c) {
-        unsigned sum = 0;
-        for (int k = 0; k < factor * factor; ++k) {
-          sum += valueAt(x * factor + k % factor, y * factor + k / factor, c);
-        }
-        const auto n = unsigned(factor * factor);
-        small.bytes.push_back(uint8_t((sum + n / 2) / n));
-      }
-    }
-  }
-  return small;
 }
 
 /// Keeps the points that are needed for the drawn curve to stay within 0.05 px (Douglas and
@@ -389,28 +328,28 @@ Report writeReport(const Dataset& dataset,
   const DetectionSource none = [] {
     return [](size_t, const LabelRecord&) { return Detections{}; };
   };
-  evaluateFrames(dataset,
-                 detections.value_or(none),
-                 options.evaluation,
-                 options.jobs,
-                 [&](FrameEvaluation&& frame) {
-                   FramePage page;
-                   page.image = frame.labels.image;
-                   page.camera = cameraName(frame.labels);
-                   page.labels = frame.labels.lines.size();
-                   for (size_t i = 0; i < frame.outcome.strata.size(); ++i) {
-                     if (frame.outcome.strata[i] == Stratum::kHeadline) {
-                       page.found += {frame.outcome.labels.back()[i].found ? 1 : 0, 1};
-                     }
-                   }
-                   const Camera& camera = dataset.camera(frame.labels);
-                   page.script =
-                       "dlsdFrame(" + scriptJson(frameJson(frames.size(), frame, camera)) + ");\n";
-                   page.thumbnail_png = encodePng(thumbnail(dataset.image(frame.labels)));
-                   summary.add(frame, camera);
-                   frames.push_back(std::move(page));
-                   records.push_back(std::move(frame.labels));
-                 });
+  evaluateFrames(
+      dataset,
+      detections.value_or(none),
+      options.evaluation,
+      options.jobs,
+      [&](FrameEvaluation&& frame) {
+        FramePage page;
+        page.image = frame.labels.image;
+        page.camera = cameraName(frame.labels);
+        page.labels = frame.labels.lines.size();
+        for (size_t i = 0; i < frame.outcome.strata.size(); ++i) {
+          if (frame.outcome.strata[i] == Stratum::kHeadline) {
+            page.found += {frame.outcome.labels.back()[i].found ? 1 : 0, 1};
+          }
+        }
+        const Camera& camera = dataset.camera(frame.labels);
+        page.script = "dlsdFrame(" + scriptJson(frameJson(frames.size(), frame, camera)) + ");\n";
+        page.thumbnail_png = encodePng(shrunk(dataset.image(frame.labels), kThumbnailPx));
+        summary.add(frame, camera);
+        frames.push_back(std::move(page));
+        records.push_back(std::move(frame.labels));
+      });
   Report report{.index_path = options.out + "/index.html",
                 .statistics = labelStatistics(records),
                 .summary = std::nullopt};

@@ -9,25 +9,13 @@ namespace dlsd {
 namespace {
 
 using hand_made::detection;
+using hand_made::frame;
 using hand_made::label;
 using hand_made::pinholeCamera;
 using hand_made::shifted;
 
 constexpr auto kHeadline = size_t(Stratum::kHeadline);
 constexpr auto kFaint = size_t(Stratum::kFaint);
-
-/// Evaluated as evaluateFrames does, but for sAP.
-FrameEvaluation frame(const std::string& camera_name,
-                      const Camera& camera,
-                      const std::vector<LabelLine>& labels,
-                      const std::vector<DetectionLine>& detections) {
-  FrameEvaluation result;
-  result.labels.camera = "cameras/" + camera_name + ".yaml";
-  result.labels.lines = labels;
-  result.detections.lines = detections;
-  result.outcome = evaluateFrame(camera, labels, detections, EvaluationOptions{});
-  return result;
-}
 
 /// Two frames. left: a headline label found from rho = 2 on by a detection 1.5 px off, and a faint
 /// one, missed; a short wrong detection. right: a headline label in two pieces; nothing else.
