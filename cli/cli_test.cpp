@@ -386,8 +386,25 @@ TEST_F(Cli, BadDataAndDetectionsAreTwo) {
   expectRefused("report --data data --out data", 2, "data");
   expectRefused("detect --data empty", 2, "manifest.json");
   expectRefused("evaluate --data data --detections missing.jsonl", 2, "missing.jsonl");
-  expectRefused("evaluate --data data --detector lsd", 2, "lsd");
-  expectRefused("evaluate --data data --detector dlsd --detections x", 2, "--detect");
+  expectRefused("evaluate --data data --detector elsed", 2, "lsd, edlines, fld");
+  expectRefused("evaluate", 2, "--data is needed");
+  expectRefused("evaluate --data data --command './a {image}'", 2, "has no {out}");
+  expectRefused("evaluate --data data --command './a {image} {out}' --timeout 0", 2, "timeout");
+  expectRefused("evaluate --data data --command './a {image} {out}' --json e.json",
+                2,
+                "./a cannot be started");
+  expectRefused("evaluate --data data --timeout 5", 2, "--command");
+  expectRefused("evaluate --data data --detector lsd,dlsd,lsd", 2, "lsd twice");
+  expectRefused("evaluate --data data --out x", 2, "--experiment");
+  expectRefused("evaluate --data data --frames 7", 2, "--experiment");
+  expectRefused("evaluate --experiment dlsd-paper --out x --min-recall 0.5@1", 2, "--min-recall");
+  expectRefused("evaluate --experiment dlsd-paper --out x --report r", 2, "--report");
+  expectRefused("evaluate --data data --curve spline", 2, "spline");
+  expectRefused("evaluate --data data --experiment lsd", 2, "lsd");
+  expectRefused("evaluate --data data --experiment dlsd-paper", 2, "--out");
+  expectRefused("evaluate --data data --min-right 0.9@3", 2, "one of 1, 2, 4");
+  expectRefused("evaluate --data data --min-right 0.9@3 --report r", 2, "--min-right");
+  expectRefused("evaluate --data data --max-rms-px -1", 2, "[0, 100]");
   expectRefused("evaluate --data data --rho 0", 2, "rho");
   expectRefused("evaluate --data data --rho nan", 2, "rho");
   expectRefused("evaluate --data data --rho 1,x", 2, "x");
@@ -434,9 +451,13 @@ TEST_F(Cli, MinRecallIsAGate) {
   write("nothing.jsonl", nothing);
   Result result = dlsd("evaluate --data data --detections nothing.jsonl --min-recall 0.5@4");
   EXPECT_EQ(result.code, 1);
-  EXPECT_EQ(result.err, "dlsd: --min-recall 0.5@4 is not reached by nothing.jsonl\n");
+  EXPECT_THAT(
+      result.err,
+      StartsWith("dlsd: --min-recall 0.5@4 is not reached by nothing.jsonl: headline labels "
+                 "found at rho = 4 px: 0/"));
+  EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1);
   EXPECT_THAT(result.out,
-              HasSubstr("\nfailed: nothing.jsonl: headline labels found at rho = 4 px are 0/"));
+              HasSubstr("\nfailed: nothing.jsonl: headline labels found at rho = 4 px: 0/"));
 
   // The labels themselves as detections find every label.
   std::string perfect;
@@ -462,6 +483,135 @@ TEST_F(Cli, MinRecallIsAGate) {
   const auto& right = all.at("at_rho").at(0).at("right");
   EXPECT_EQ(right.at("counted"), right.at("total"));
   EXPECT_GT(right.at("total"), 0);
+}
+
+TEST_F(Cli, GatesOnPrecisionAndError) {
+  generate("--scene paper");
+  std::string shifted;
+  for (const char* number : {"000000", "000001"}) {
+    const auto label =
+        nlohmann::json::parse(contentOf(folder / "data/labels" / (std::string(number) + ".json")));
+    nlohmann::json record{{"image", label.at("image")}, {"lines", nlohmann::json::array()}};
+    for (const auto& line : label.at("lines")) {
+      record["lines"].push_back({{"points", line.at("points")}});
+      for (auto& point : record["lines"].back()["points"]) {
+        point[0] = point[0].get<double>() + 0.3;
+      }
+    }
+    // As many lines again on nothing, 6 degrees long.
+    for (size_t i = 0; i < label.at("lines").size(); ++i) {
+      record["lines"].push_back({{"points", {{2, 2 + 0.1 * double(i)}, {2, 30}}}});
+    }
+    shifted += record.dump() + "\n";
+  }
+  write("d.jsonl", shifted);
+  const std::string evaluate = "evaluate --data data --detections d.jsonl ";
+  EXPECT_EQ(dlsd(evaluate + "--min-recall 0.9@1,1@4 --min-right 0.1@1 --max-rms-px 0.31").code, 0);
+  Result result = dlsd(evaluate + "--min-recall 0.9@1 --min-precision 0.9@1 --max-rms-px 0.01");
+  EXPECT_EQ(result.code, 1);
+  EXPECT_THAT(result.err,
+              HasSubstr("--min-right 0.9@1 is not reached by d.jsonl: detections >= 5 deg"));
+  EXPECT_THAT(result.err, HasSubstr("; --max-rms-px 0.01 is not reached by d.jsonl: rms distance"));
+  EXPECT_THAT(result.err, testing::Not(HasSubstr("min-recall")));
+  EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1);
+  EXPECT_THAT(result.out, HasSubstr("\npassed: d.jsonl: headline labels found"));
+}
+
+TEST_F(Cli, ReportIsTheSameForAnyNumberOfThreads) {
+  generate();
+  ASSERT_EQ(dlsd("generate --camera wide.yaml --count 2 --seed 4 --noise 8 --out more").code, 0);
+  for (const char* jobs : {"1", "3"}) {
+    const Result result = dlsd(std::string("evaluate --data data --data more --detector "
+                                           "dlsd,dlsd-paper --json e.json --report r") +
+                               jobs + " --jobs " + jobs);
+    ASSERT_EQ(result.code, 0) << result.err;
+    EXPECT_THAT(result.out, EndsWith(std::string("\nr") + jobs + "/index.html\n"));
+  }
+  for (const char* name : {"index.html", "figures.csv", "evaluation.json"}) {
+    EXPECT_EQ(contentOf(folder / "r1" / name), contentOf(folder / "r3" / name)) << name;
+    EXPECT_NE(contentOf(folder / "r1" / name), "") << name;
+  }
+  EXPECT_EQ(contentOf(folder / "e.json"), contentOf(folder / "r1/evaluation.json"));
+  const auto json = nlohmann::json::parse(contentOf(folder / "e.json"));
+  EXPECT_EQ(json.at("results").at(1).at("all").at("frames"), 4);
+  const std::string page = contentOf(folder / "r1/index.html");
+  EXPECT_THAT(page, HasSubstr("Line detection on data, more"));
+  EXPECT_THAT(page, testing::Not(HasSubstr("http")));
+  expectRefused("evaluate --data data --data more --detections d.jsonl", 2, "once for each");
+  expectRefused("evaluate --data data --report wide.yaml", 3, "wide.yaml");
+}
+
+TEST_F(Cli, AnyonesProgramIsEvaluated) {
+  generate();
+  write("detector.sh",
+        "#!/bin/sh\ncase \"$1\" in *000001.png) exit $3;; esac\n"
+        "echo '{\"lines\": [{\"points\": [[10, 10], [90, 60]]}]}' > \"$2\"\n");
+  Result result =
+      dlsd("evaluate --data data --command 'sh detector.sh {image} {out} 5' --json e.json");
+  EXPECT_EQ(result.code, 2);
+  EXPECT_EQ(result.err, "dlsd: images/000001.png: sh ended with code 5\n");
+  EXPECT_FALSE(fs::exists(folder / "e.json"));
+  write("detector.sh",
+        "#!/bin/sh\necho '{\"lines\": [{\"points\": [[10, 10], [90, 60]]}]}' > \"$2\"\n");
+  result = dlsd(
+      "evaluate --data data --command 'sh detector.sh {image} {out} {camera}' --time --json "
+      "e.json");
+  ASSERT_EQ(result.code, 0) << result.err;
+  const auto all = nlohmann::json::parse(contentOf(folder / "e.json")).at("results").at(0);
+  EXPECT_EQ(all.at("detections"), "sh");
+  EXPECT_EQ(all.at("all").at("detections"), 2);
+  EXPECT_THAT(result.out, HasSubstr("\ntime ms "));
+}
+
+TEST_F(Cli, FilesProgramsAndDetectorsAreEvaluatedSideBySide) {
+  generate();
+  // The three points of ULSD's order 2, in a program and in a file; a built-in detector is not
+  // asked for Bezier points.
+  const std::string lines = "\"lines\": [{\"points\": [[10, 10], [50, 30], [90, 60]]}]";
+  write("my dlsd",
+        "#!/bin/sh\nprintf '%s' \"$1\" > \"last image\"\n"
+        "echo '{" +
+            lines + "}' > \"$2\"\n");
+  fs::permissions(folder / "my dlsd", fs::perms::owner_all);
+  write("dlsd",
+        "{\"image\": \"000000.png\", " + lines + "}\n{\"image\": \"000001.png\", " + lines + "}\n");
+  fs::rename(folder / "data", folder / "my 'data'");
+  const Result result = dlsd(
+      "evaluate --data \"my 'data'\" --detections dlsd --command \"'./my dlsd' {image} {out}\" "
+      "--detector dlsd --curve bezier --jobs 1 --json e.json --report r");
+  ASSERT_EQ(result.code, 0) << result.err;
+  const auto json = nlohmann::json::parse(contentOf(folder / "e.json")).at("results");
+  ASSERT_EQ(json.size(), 3U);
+  EXPECT_EQ(json[0].at("detections"), "dlsd");
+  EXPECT_EQ(json[1].at("detections"), "my dlsd");
+  EXPECT_EQ(json[2].at("detections"), "dlsd (2)");
+  EXPECT_EQ(json[0].at("all"), json[1].at("all"));
+  EXPECT_EQ(json[0].at("figures"), json[1].at("figures"));
+  EXPECT_THAT(contentOf(folder / "last image"), EndsWith("/my 'data'/images/000001.png"));
+  EXPECT_THAT(contentOf(folder / "r/index.html"), HasSubstr("Line detection on my &#39;data&#39;"));
+}
+
+TEST_F(Cli, PaperExperimentRuns) {
+  generate("--scene paper");
+  Result result =
+      dlsd("evaluate --experiment dlsd-paper --data data --detector dlsd,dlsd-paper --out exp");
+  ASSERT_EQ(result.code, 0) << result.err;
+  EXPECT_THAT(result.out, StartsWith("Table 1 on 2 frames\n"));
+  EXPECT_THAT(result.out, HasSubstr("\nFig. 4: recall of dlsd in %"));
+  EXPECT_THAT(result.out, EndsWith("\nexp/index.html\n"));
+  for (const char* name : {"index.html", "experiment.csv", "experiment.json"}) {
+    EXPECT_TRUE(fs::exists(folder / "exp" / name)) << name;
+  }
+  EXPECT_FALSE(fs::exists(folder / "exp/data"));
+  // Without data it makes the sequence.
+  write("mine.sh", "echo '{\"lines\": [{\"points\": [[10, 10], [90, 60]]}]}' > $2\n");
+  result = dlsd(
+      "evaluate --experiment dlsd-paper --frames 1 --detector dlsd --command 'sh mine.sh {image} "
+      "{out}' --out made");
+  ASSERT_EQ(result.code, 0) << result.err;
+  EXPECT_THAT(result.out, HasSubstr("\nFig. 4: recall of sh in %"));
+  EXPECT_TRUE(fs::exists(folder / "made/data/images/000000.png"));
+  EXPECT_THAT(contentOf(folder / "made/data/cameras/tum_mono_wide.yaml"), HasSubstr("0.933271"));
 }
 
 }  // namespace
