@@ -93,15 +93,22 @@ std::string casesHtml(const std::string& title, const std::vector<WorstCase>& ca
   return out + "</div>\n";
 }
 
+/// The value; below it its interval and what was counted.
 std::string cell(const Figure* figure) {
   if (figure == nullptr) {
     return "<td></td>";
   }
-  std::string out = "<td>" + escapedHtml(valueText(*figure));
-  if (figure->ratio) {
-    out += fmt::format("<small>{}/{}</small>", figure->ratio->counted, figure->ratio->total);
+  std::string value = valueText(*figure), below;
+  if (const size_t from = value.find(" ["), to = value.find(']'); from != std::string::npos) {
+    below = value.substr(from + 1, to - from);
+    value.erase(from, to + 1 - from);
   }
-  return out + "</td>";
+  if (figure->ratio) {
+    below += fmt::format(
+        "{}{}/{}", below.empty() ? "" : " &nbsp;", figure->ratio->counted, figure->ratio->total);
+  }
+  return "<td>" + escapedHtml(value) + (below.empty() ? "" : "<small>" + below + "</small>") +
+         "</td>";
 }
 
 std::string tableHtml(const std::vector<std::string>& columns, const std::string& rows) {
@@ -206,16 +213,20 @@ std::string normalsHtml(const std::vector<EvaluatedDetections>& all) {
                    rows);
 }
 
-/// What a dimension's axis is called.
-const std::pair<const char*, const char*> kDimensions[] = {
-    {"length px", "length, px"},
-    {"length deg", "length, degrees"},
-    {"contrast", "contrast, grey levels"},
-    {"field angle deg", "field angle of the middle, degrees"},
-    {"kind", "kind"},
-    {"crowded", "crowded"},
-    {"noise", "read noise, grey levels"},
-    {"camera model", "camera model"}};
+struct PlottedDimension {
+  const char* name;
+  const char* axis;
+  bool ordered;
+};
+constexpr PlottedDimension kDimensions[] = {
+    {"length px", "length, px", true},
+    {"length deg", "length, degrees", true},
+    {"contrast", "contrast, grey levels", true},
+    {"field angle deg", "field angle of the middle, degrees", true},
+    {"kind", "kind", false},
+    {"crowded", "crowded", false},
+    {"noise", "read noise, grey levels", true},
+    {"camera model", "camera model", false}};
 
 /// Series: the tolerances if there is one detector, else the detectors at one tolerance.
 std::vector<std::string> seriesNames(const std::vector<EvaluatedDetections>& all, double rho) {
@@ -234,9 +245,9 @@ std::vector<std::string> seriesNames(const std::vector<EvaluatedDetections>& all
 
 std::string strataPlot(const std::vector<EvaluatedDetections>& all,
                        double plotted_rho,
-                       const std::string& table,
-                       const std::string& title,
-                       const std::string& axis) {
+                       const std::string& what,
+                       const PlottedDimension& dimension) {
+  const std::string table = what + " by " + dimension.name;
   std::vector<std::string> categories;
   for (const Figure* figure : all.front().figures.of(table, plotted_rho)) {
     categories.push_back(figure->stratum);
@@ -245,6 +256,7 @@ std::string strataPlot(const std::vector<EvaluatedDetections>& all,
   const auto add = [&](const std::string& name, const Figures& figures, double rho) {
     PlotSeries& one = series.emplace_back();
     one.name = name;
+    one.joined = dimension.ordered;
     size_t i = 0;
     for (const Figure* figure : figures.of(table, rho)) {
       if (figure->value) {
@@ -262,8 +274,9 @@ std::string strataPlot(const std::vector<EvaluatedDetections>& all,
       add(fmt::format("rho = {:g} px", rho), all.front().figures, rho);
     }
   }
-  return linePlot(title,
-                  {.title = axis, .categories = categories},
+  const char* whose = what == "found" ? "Labels" : "Detections";
+  return linePlot(fmt::format("{} {}", whose, table),
+                  {.title = dimension.axis, .categories = categories},
                   {.title = "share", .from = 0, .to = 1, .percent = true},
                   series);
 }
@@ -379,7 +392,8 @@ std::string strataHtml(const std::vector<EvaluatedDetections>& all) {
 
 constexpr std::string_view kPageStyle = R"css(
 h3 { font-size: 15px; margin: 22px 0 8px; }
-table { font-size: 14px; } td small { display: inline-block; }
+table { font-size: 14px; } td { vertical-align: top; } td small { display: block; margin: 0; line-height: 1.25; }
+th { white-space: normal; min-width: 78px; vertical-align: bottom; }
 details { margin-top: 14px; } summary { cursor: pointer; font-weight: 600; }
 .cases { display: grid; grid-template-columns: repeat(auto-fill, minmax(230px, 1fr)); gap: 14px; }
 figure { margin: 0; background: var(--card); border: 1px solid var(--line); border-radius: 8px; overflow: hidden; }
@@ -527,19 +541,11 @@ void writeEvaluationPage(const std::vector<EvaluatedDetections>& all,
   body += headlineHtml(all);
   body += "<h2>Where lines are found</h2>\n" + plotLegend(seriesNames(all, rho)) +
           "<div class=\"plots\">\n";
-  for (const auto& [dimension, axis] : kDimensions) {
-    body += strataPlot(all,
-                       rho,
-                       std::string("found by ") + dimension,
-                       std::string("Labels found by ") + dimension,
-                       axis);
+  for (const PlottedDimension& dimension : kDimensions) {
+    body += strataPlot(all, rho, "found", dimension);
   }
-  for (const auto& [dimension, axis] : {kDimensions[1], kDimensions[3]}) {
-    body += strataPlot(all,
-                       rho,
-                       std::string("right by ") + dimension,
-                       std::string("Detections right by ") + dimension,
-                       axis);
+  for (const PlottedDimension& dimension : {kDimensions[1], kDimensions[3]}) {
+    body += strataPlot(all, rho, "right", dimension);
   }
   body += precisionRecallPlot(all, plotted) + "</div>\n";
   body += strataHtml(all);

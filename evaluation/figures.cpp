@@ -706,8 +706,8 @@ std::string table(const Figures& figures, const EvaluationOptions& options) {
        {"median deg",
         "rms deg",
         "bound rms deg",
-        "offset / bound, rms",
-        "roll / bound, rms",
+        "offset / bound (rms)",
+        "roll / bound (rms)",
         "labels"});
   for (const Figure* figure : figures.of("normal deg")) {
     const size_t comma = figure->stratum.rfind(", median");

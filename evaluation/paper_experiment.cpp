@@ -168,7 +168,8 @@ std::string timeText(const MeanAndDeviation& time) {
   return time.count > 0 ? fmt::format("{:.2f} ({:.2f})", time.mean, time.deviation) : "-";
 }
 
-/// The time that all detectors on rectified images spend before they start: the mean of theirs.
+/// The time that detectors on rectified images spend before they start: of the first of them, they
+/// all do the same.
 std::string rectificationText(const Experiment& experiment) {
   for (const MeanAndDeviation& time : experiment.rectification_ms) {
     if (time.count > 0) {

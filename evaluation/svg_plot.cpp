@@ -142,32 +142,39 @@ std::string linePlot(const std::string& title,
       (kTop + kHeight - kBottom) / 2,
       escapedHtml(y.title));
   for (size_t s = 0; s < series.size(); ++s) {
-    // Whiskers of several series stand side by side.
-    const double aside = (double(s) - double(series.size() - 1) / 2) * 3;
+    // Several series stand side by side, so that their whiskers can be told apart.
+    const double aside = (double(s) - double(series.size() - 1) / 2) * (series[s].joined ? 3 : 7);
     std::string path;
     for (const PlotPoint& point : series[s].points) {
-      path += fmt::format(
-          "{}{:.1f},{:.1f}", path.empty() ? "" : " ", atX(point.x) + aside, atY(point.y));
+      const double px = atX(point.x) + aside;
+      path += fmt::format("{}{:.1f},{:.1f}", path.empty() ? "" : " ", px, atY(point.y));
       if (point.interval) {
         out += fmt::format(
-            "<line class=\"whisker s{}\" x1=\"{:.1f}\" x2=\"{:.1f}\" y1=\"{:.1f}\" y2=\"{:.1f}\"/>",
+            "<line class=\"whisker s{0}\" x1=\"{1:.1f}\" x2=\"{1:.1f}\" y1=\"{2:.1f}\" "
+            "y2=\"{3:.1f}\"/>",
             s,
-            atX(point.x) + aside,
-            atX(point.x) + aside,
+            px,
             atY(point.interval->low),
             atY(point.interval->high));
       }
       if (series[s].markers) {
-        out += fmt::format("<circle class=\"dot s{}\" cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"3\"/>",
-                           s,
-                           atX(point.x) + aside,
-                           atY(point.y));
+        out += fmt::format(
+            "<circle class=\"dot s{}\" cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"3\"><title>{}: "
+            "{}</title></circle>",
+            s,
+            px,
+            atY(point.y),
+            escapedHtml(series[s].name),
+            tickText(y, std::round(point.y * 1e3) / 1e3));
       }
     }
-    out += fmt::format("<polyline class=\"curve s{}\" points=\"{}\"><title>{}</title></polyline>\n",
-                       s,
-                       path,
-                       escapedHtml(series[s].name));
+    if (series[s].joined) {
+      out += fmt::format("<polyline class=\"curve s{}\" points=\"{}\"><title>{}</title></polyline>",
+                         s,
+                         path,
+                         escapedHtml(series[s].name));
+    }
+    out += "\n";
   }
   return out + "</svg>\n";
 }

@@ -20,6 +20,7 @@ struct PlotSeries {
   std::string name;
   std::vector<PlotPoint> points;
   bool markers = true;
+  bool joined = true;  ///< By lines: not where categories have no order.
 };
 
 struct PlotAxis {
@@ -30,8 +31,8 @@ struct PlotAxis {
   std::vector<std::string> categories{};  ///< If any: x is an index into them.
 };
 
-/// Lines through the points, with whiskers for intervals. Points outside the axes are clamped to
-/// them.
+/// Points, joined by lines or not, with whiskers for intervals. Points outside the axes are clamped
+/// to them.
 [[nodiscard]] std::string linePlot(const std::string& title,
                                    const PlotAxis& x,
                                    const PlotAxis& y,

@@ -69,7 +69,7 @@ TEST_P(Peer, FindsALongEdgeWhereItIsOnADistortedImage) {
   // The view is about 100 degrees wide.
   EXPECT_GE(length, 60 * M_PI / 180);
   // Nobody's convention is off by half a pixel.
-  EXPECT_LE(std::abs(sum / double(count)), 0.6);
+  EXPECT_LE(std::abs(sum / double(count)), 0.3);
   RecordProperty("mean_offset_px", std::to_string(sum / double(count)));
 }
 
