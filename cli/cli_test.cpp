@@ -538,7 +538,9 @@ TEST_F(Cli, ReportIsTheSameForAnyNumberOfThreads) {
   EXPECT_THAT(page, HasSubstr("Line detection on data, more"));
   EXPECT_THAT(page, testing::Not(HasSubstr("http")));
   expectRefused("evaluate --data data --data more --detections d.jsonl", 2, "once for each");
-  expectRefused("evaluate --data data --report wide.yaml", 3, "wide.yaml");
+  expectRefused("evaluate --data data --report wide.yaml", 2, "wide.yaml is no folder");
+  expectRefused("evaluate --data data --report wide.yaml/a/b", 2, "wide.yaml is no folder");
+  expectRefused("evaluate --experiment dlsd-paper --data data --out wide.yaml", 2, "no folder");
 }
 
 TEST_F(Cli, AnyonesProgramIsEvaluated) {
@@ -549,7 +551,7 @@ TEST_F(Cli, AnyonesProgramIsEvaluated) {
   Result result =
       dlsd("evaluate --data data --command 'sh detector.sh {image} {out} 5' --json e.json");
   EXPECT_EQ(result.code, 2);
-  EXPECT_EQ(result.err, "dlsd: images/000001.png: sh ended with code 5\n");
+  EXPECT_EQ(result.err, "dlsd: data/images/000001.png: sh ended with code 5\n");
   EXPECT_FALSE(fs::exists(folder / "e.json"));
   write("detector.sh",
         "#!/bin/sh\necho '{\"lines\": [{\"points\": [[10, 10], [90, 60]]}]}' > \"$2\"\n");

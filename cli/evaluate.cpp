@@ -2,16 +2,19 @@
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <unistd.h>
 
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
 #include <algorithm>
+#include <cerrno>
 #include <charconv>
 #include <deque>
 #include <filesystem>
 #include <functional>
 #include <memory>
 #include <optional>
+#include <system_error>
 
 #include "cameras/calibration/files.h"
 #include "cli/command.h"
@@ -218,6 +221,23 @@ std::vector<std::string> reportFiles(const std::string& folder) {
   return {folder + "/index.html", folder + "/figures.csv", folder + "/evaluation.json"};
 }
 
+/// Throws if there can't be a folder at `path`: asked before long work.
+void checkPlaceForFolder(const std::string& path) {
+  namespace fs = std::filesystem;
+  std::error_code error;
+  fs::path at = fs::absolute(path);
+  while (!fs::exists(at, error) && at.has_relative_path()) {
+    at = at.parent_path();
+  }
+  if (!fs::is_directory(at, error)) {
+    throw InputError(fmt::format("{}: {} is no folder", path, at.string()));
+  }
+  if (::access(at.c_str(), W_OK) != 0) {
+    throw SystemError(fmt::format(
+        "{}: cannot write in {}: {}", path, at.string(), std::generic_category().message(errno)));
+  }
+}
+
 /// The paper's sequence in `out`/data, if the user has none.
 std::string paperData(const Arguments& arguments) {
   if (arguments.data.size() > 1) {
@@ -242,6 +262,7 @@ int runExperiment(const Arguments& arguments) {
   if (arguments.out.empty()) {
     throw InputError("--experiment needs --out DIR");
   }
+  checkPlaceForFolder(arguments.out);
   const std::vector<std::string> outputs{arguments.out + "/index.html",
                                          arguments.out + "/experiment.csv",
                                          arguments.out + "/experiment.json"};
@@ -255,6 +276,11 @@ int runExperiment(const Arguments& arguments) {
   checkDetectors(names);
   const Dataset dataset(paperData(arguments));
   checkOutputs(filesOf(dataset), outputs);
+  if (dataset.manifest().at("cameras").size() != 1) {
+    throw InputError(fmt::format("{}: has {} cameras, the experiment is about one",
+                                 dataset.folder(),
+                                 dataset.manifest().at("cameras").size()));
+  }
   std::vector<ExperimentDetector> detectors;
   std::optional<VirtualView> view;
   for (const std::string& name : names) {
@@ -303,6 +329,7 @@ int run(Arguments& arguments) {
     outputs.push_back(arguments.json);
   }
   if (!arguments.report.empty()) {
+    checkPlaceForFolder(arguments.report);
     for (const std::string& file : reportFiles(arguments.report)) {
       outputs.push_back(file);
     }

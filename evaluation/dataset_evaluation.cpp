@@ -21,6 +21,22 @@
 
 namespace dlsd {
 
+Detections detectionsOf(const DetectionRecord& record,
+                        const LabelRecord& labels,
+                        const std::string& source) {
+  if ((record.width != 0 && record.width != labels.width) ||
+      (record.height != 0 && record.height != labels.height)) {
+    throw InputError(fmt::format("{}: image \"{}\" is {}x{} there, {}x{} in the data folder",
+                                 source,
+                                 record.image,
+                                 record.width,
+                                 record.height,
+                                 labels.width,
+                                 labels.height));
+  }
+  return {record.lines, record.time_ms, std::nullopt, source};
+}
+
 DetectionSource detectionsOfFile(const Dataset& dataset, const std::string& path) {
   std::vector<std::string> images;
   for (const auto& frame : dataset.manifest().at("frames")) {
@@ -30,18 +46,7 @@ DetectionSource detectionsOfFile(const Dataset& dataset, const std::string& path
       matchToImages(readDetections(path), images, dataset.folder(), path));
   return [records, path]() -> FrameDetections {
     return [records, path](size_t i, const LabelRecord& labels) {
-      const DetectionRecord& record = records->at(i);
-      if ((record.width != 0 && record.width != labels.width) ||
-          (record.height != 0 && record.height != labels.height)) {
-        throw InputError(fmt::format("{}: image \"{}\" is {}x{} there, {}x{} in the data folder",
-                                     path,
-                                     record.image,
-                                     record.width,
-                                     record.height,
-                                     labels.width,
-                                     labels.height));
-      }
-      return Detections{record.lines, record.time_ms, std::nullopt};
+      return detectionsOf(records->at(i), labels, path);
     };
   };
 }
@@ -151,7 +156,13 @@ void evaluateFrames(const Dataset& dataset,
       }
       frame.structure = structureOf(frame.labels, curves, frame.outcome);
     } catch (const std::invalid_argument& error) {
-      throw InputError(fmt::format("{}: {}", frame.labels.image, error.what()));
+      const std::string& given_by = frame.detections.source;
+      throw InputError(fmt::format("{}{}{}/{}: {}",
+                                   given_by,
+                                   given_by.empty() ? "" : ": ",
+                                   dataset.folder(),
+                                   frame.labels.image,
+                                   error.what()));
     }
     return frame;
   };

@@ -18,6 +18,7 @@ struct Detections {
   std::vector<DetectionLine> lines;
   std::optional<double> time_ms;           ///< Of detection alone.
   std::optional<double> rectification_ms;  ///< Of rectification, where the detector needs it.
+  std::string source{};                    ///< For complaints: the file, the program. May be empty.
 };
 
 /// The detections of frame i of a dataset.
@@ -25,6 +26,11 @@ using FrameDetections = std::function<Detections(size_t, const LabelRecord&)>;
 
 /// Makes the above, one for each thread.
 using DetectionSource = std::function<FrameDetections()>;
+
+/// Detections of a record. Throws InputError if it gives another image size than the labels.
+[[nodiscard]] Detections detectionsOf(const DetectionRecord& record,
+                                      const LabelRecord& labels,
+                                      const std::string& source);
 
 /// A detections file (JSON Lines), matched to the dataset's images. Throws InputError as
 /// readDetections and matchToImages do; when a frame is read also if its record gives another image
@@ -55,8 +61,8 @@ struct FrameEvaluation {
 
 /// Evaluates frames in `jobs` threads (0: one per core) and hands them over in the order of the
 /// dataset, one at a time, from the calling thread or another: the same calls whatever the number
-/// of threads. Errors are thrown as InputError naming the image; that of the first frame that has
-/// one.
+/// of threads. Errors are thrown as InputError naming the detections' source and the image; that
+/// of the first frame that has one.
 void evaluateFrames(const Dataset& dataset,
                     const DetectionSource& source,
                     const EvaluationOptions& options,

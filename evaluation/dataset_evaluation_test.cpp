@@ -215,8 +215,10 @@ TEST_F(DatasetEvaluation, BezierPointsAreJoinedByTheirCurve) {
   EXPECT_LE(bezier.outcome.errors.at(0)->sum_px / double(bezier.outcome.errors[0]->samples), 0.02);
   EXPECT_EQ(bezier.structure[kCurveAll].detections.at(0).matches[0], StructuralMatch::kTrue);
   points.resize(9, {10, 10});
-  EXPECT_EQ(message([&] { (void)run(true); }),
-            "images/000000.png: detection 0 has 9 points, a Bezier curve passes through 2 to 8");
+  EXPECT_EQ(
+      message([&] { (void)run(true); }),
+      folder / "det.jsonl: " + data +
+          "/images/000000.png: detection 0 has 9 points, a Bezier curve passes through 2 to 8");
 }
 
 TEST_F(DatasetEvaluation, StructureCountsClearLabelsApart) {
@@ -260,7 +262,8 @@ TEST_F(DatasetEvaluation, ErrorsNameTheFirstBadFrame) {
     records[bad].lines.push_back(hand_made::detection({{5, 5}, {5, 5}}));
     for (const int jobs : {1, 3}) {
       EXPECT_EQ(run(jobs),
-                "images/00000" + std::to_string(bad) + ".png: detection 1 has no length");
+                folder / "det.jsonl: " + data + "/images/00000" + std::to_string(bad) +
+                    ".png: detection 1 has no length");
     }
   }
   records[0].width = 1280;

@@ -277,7 +277,7 @@ std::string strataPlot(const std::vector<EvaluatedDetections>& all,
   const char* whose = what == "found" ? "Labels" : "Detections";
   return linePlot(fmt::format("{} {}", whose, table),
                   {.title = dimension.axis, .categories = categories},
-                  {.title = "share", .from = 0, .to = 1, .percent = true},
+                  shareAxis("share", series),
                   series);
 }
 
@@ -302,7 +302,7 @@ std::string precisionRecallPlot(const std::vector<EvaluatedDetections>& all, siz
   }
   return linePlot("Precision and recall, as the least score falls",
                   {.title = "recall: headline labels found", .percent = true},
-                  {.title = "precision: detections right", .percent = true},
+                  shareAxis("precision: detections right", series),
                   series);
 }
 

@@ -232,7 +232,8 @@ DetectionSource detectionsOfCommand(const Dataset& dataset,
       const Ending ending = runProgram(filled, errors, options.timeout_s);
       const double time_ms = 1000 * (nowS() - start_s);
       const auto fail = [&](const std::string& what) {
-        throw InputError(fmt::format("{}: {} {}", labels.image, words[0], what));
+        throw InputError(
+            fmt::format("{}/{}: {} {}", dataset.folder(), labels.image, words[0], what));
       };
       const auto withStderr = [&](std::string what) {
         const std::string said = lastLine(errors);
@@ -262,12 +263,11 @@ DetectionSource detectionsOfCommand(const Dataset& dataset,
       if (json.is_object()) {
         json["image"] = labels.image;
       }
-      DetectionRecord record =
-          detectionRecordFromJson(json, labels.image + ": output of " + words[0]);
-      Detections detections{std::move(record.lines), std::nullopt, std::nullopt};
-      if (timed) {
-        detections.time_ms = record.time_ms.value_or(time_ms);
-      }
+      const std::string source = "output of " + words[0];
+      const DetectionRecord record = detectionRecordFromJson(
+          json, fmt::format("{} for {}/{}", source, dataset.folder(), labels.image));
+      Detections detections = detectionsOf(record, labels, source);
+      detections.time_ms = timed ? std::optional(record.time_ms.value_or(time_ms)) : std::nullopt;
       return detections;
     };
   };

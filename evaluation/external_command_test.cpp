@@ -92,20 +92,28 @@ TEST_F(ExternalCommand, OldOutputIsNotReadAgain) {
   // Writes for the first image only.
   const Result result =
       run(sh("case \"$1\" in *000000.png) echo \"{\\\"lines\\\": []}\" > \"$2\";; esac"));
-  EXPECT_EQ(result.error, "images/000001.png: sh ended well, but wrote no file {out}");
+  EXPECT_EQ(result.error,
+            folder / "data/images/000001.png: sh ended well, but wrote no file {out}");
 }
 
 TEST_F(ExternalCommand, FailuresSayWhatHappened) {
   EXPECT_EQ(run("./no-such-detector {image} {out}").error,
-            "images/000000.png: ./no-such-detector cannot be started: No such file or directory");
+            folder /
+                "data/images/000000.png: ./no-such-detector cannot be started: No such file or "
+                "directory");
   EXPECT_EQ(run(sh("echo first >&2; echo out of luck >&2; exit 3")).error,
-            "images/000000.png: sh ended with code 3: out of luck");
-  EXPECT_EQ(run(sh("exit 4")).error, "images/000000.png: sh ended with code 4");
-  EXPECT_EQ(run(sh("kill -SEGV $$")).error, "images/000000.png: sh was killed by signal 11");
-  EXPECT_EQ(run(sh("echo hello > \"$2\"")).error,
-            "images/000000.png: sh wrote something that is not one JSON object to {out}");
-  EXPECT_THAT(run(sh("echo 3 > \"$2\"")).error, HasSubstr("images/000000.png: output of sh"));
+            folder / "data/images/000000.png: sh ended with code 3: out of luck");
+  EXPECT_EQ(run(sh("exit 4")).error, folder / "data/images/000000.png: sh ended with code 4");
+  EXPECT_EQ(run(sh("kill -SEGV $$")).error,
+            folder / "data/images/000000.png: sh was killed by signal 11");
+  EXPECT_EQ(
+      run(sh("echo hello > \"$2\"")).error,
+      folder / "data/images/000000.png: sh wrote something that is not one JSON object to {out}");
+  EXPECT_THAT(run(sh("echo 3 > \"$2\"")).error,
+              HasSubstr("output of sh for " + folder / "data/images/000000.png"));
   EXPECT_THAT(run(sh("echo \"{}\" > \"$2\"")).error, HasSubstr("lines"));
+  EXPECT_THAT(run(sh("echo \"{\\\"width\\\": 320, \\\"lines\\\": []}\" > \"$2\"")).error,
+              HasSubstr("is 320x0 there, 640x480 in the data folder"));
   EXPECT_THAT(
       run(sh("echo \"{\\\"lines\\\": [{\\\"points\\\": [[1, 2], [1, 2]]}]}\" > \"$2\"")).error,
       HasSubstr("detection 0 has no length"));
@@ -116,7 +124,8 @@ TEST_F(ExternalCommand, AProgramThatHangsIsKilledWithWhatItStarted) {
   const std::string pid_file = folder / "pid";
   const Result result =
       run("sh -c 'sleep 60 & echo $! > \"$3\"; wait' name {image} {out} '" + pid_file + "'", 0.5);
-  EXPECT_EQ(result.error, "images/000000.png: sh took longer than 0.5 s and was killed");
+  EXPECT_EQ(result.error,
+            folder / "data/images/000000.png: sh took longer than 0.5 s and was killed");
   EXPECT_LE(std::chrono::steady_clock::now() - start, std::chrono::seconds(20));
   std::string pid;
   std::ifstream(pid_file) >> pid;

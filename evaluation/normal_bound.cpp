@@ -40,7 +40,7 @@ std::optional<ImageNoise> imageNoise(const LabelRecord& record) {
     } else if (key == "read_noise_levels" && value.is_number()) {
       noise.noise_levels = value.get<double>();
     } else if (key == "encoding" && value == "linear") {
-    } else if (key == "exposure" || (key == "bits" && value == 8)) {
+    } else if (key == "exposure" || key == "read_noise_seed" || (key == "bits" && value == 8)) {
     } else if (value.is_null() || value == 0 || value == false) {  // switched off
     } else {
       return std::nullopt;

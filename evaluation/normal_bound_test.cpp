@@ -161,7 +161,8 @@ TEST(NormalBound, NoBoundWhereItDoesNotHold) {
   EXPECT_TRUE(known(R"({"psf_sigma_px": 0.7, "read_noise_levels": 2, "encoding": "linear"})"));
   EXPECT_EQ(imageNoise(record)->blur_px, 0.7);
   EXPECT_EQ(imageNoise(record)->noise_levels, 2);
-  EXPECT_TRUE(known(R"({"psf_sigma_px": 0.7, "exposure": 2, "read_noise_levels": 2,
+  EXPECT_TRUE(
+      known(R"({"psf_sigma_px": 0.7, "exposure": 2, "read_noise_levels": 2, "read_noise_seed": 9,
                         "encoding": "linear", "bits": 8, "vignetting": 0})"));
   EXPECT_FALSE(known(R"({"psf_sigma_px": 0.7, "read_noise_levels": 2, "encoding": "srgb"})"));
   EXPECT_FALSE(known(R"({"psf_sigma_px": 0.7, "encoding": "linear"})"));

@@ -189,8 +189,7 @@ const std::array<
     std::pair<const char*, std::array<Ratio, kPaperRhosPx.size()> ExperimentRow::OfDetector::*>,
     3>
     kTruths{{{"labels found", &ExperimentRow::OfDetector::found},
-             {"labels found, of those in the rectified view",
-              &ExperimentRow::OfDetector::found_in_view},
+             {"labels in the rectified view found", &ExperimentRow::OfDetector::found_in_view},
              {"lines right", &ExperimentRow::OfDetector::right}}};
 
 ordered_json toJson(const Ratio& ratio) {
@@ -315,7 +314,7 @@ std::string sharePlot(const Experiment& experiment,
                   {.title = fmt::format("least length, % of {:g} degrees", field_deg),
                    .from = 0,
                    .to = kPaperPercents.back()},
-                  {.title = "share", .from = 0, .to = 1, .percent = true},
+                  shareAxis("share", series),
                   series);
 }
 

@@ -31,7 +31,9 @@ std::vector<double> ticks(const PlotAxis& axis) {
       step = candidate * magnitude;
     }
   }
-  for (double k = std::ceil(axis.from / step - 1e-9); k * step <= axis.to + 1e-9 * step; ++k) {
+  // Plus 0: no "-0".
+  for (double k = std::ceil(axis.from / step - 1e-9) + 0.0; k * step <= axis.to + 1e-9 * step;
+       ++k) {
     values.push_back(k * step);
   }
   return values;
@@ -88,6 +90,20 @@ std::string escapedHtml(std::string_view text) {
   return out;
 }
 
+PlotAxis shareAxis(const std::string& title, const std::vector<PlotSeries>& series) {
+  double least = 1;
+  for (const PlotSeries& one : series) {
+    for (const PlotPoint& point : one.points) {
+      least = std::min({least, point.y, point.interval ? point.interval->low : point.y});
+    }
+  }
+  PlotAxis axis{.title = title, .from = 0, .to = 1, .percent = true};
+  for (const double from : {0.5, 0.8, 0.9}) {
+    axis.from = least >= from ? from : axis.from;
+  }
+  return axis;
+}
+
 std::string linePlot(const std::string& title,
                      const PlotAxis& x,
                      const PlotAxis& y,
@@ -142,8 +158,10 @@ std::string linePlot(const std::string& title,
       (kTop + kHeight - kBottom) / 2,
       escapedHtml(y.title));
   for (size_t s = 0; s < series.size(); ++s) {
-    // Several series stand side by side, so that their whiskers can be told apart.
-    const double aside = (double(s) - double(series.size() - 1) / 2) * (series[s].joined ? 3 : 7);
+    // In categories several series stand side by side, so that their whiskers can be told apart.
+    const double aside = x.categories.empty() ? 0
+                                              : (double(s) - double(series.size() - 1) / 2) *
+                                                    (series[s].joined ? 3 : 7);
     std::string path;
     for (const PlotPoint& point : series[s].points) {
       const double px = atX(point.x) + aside;

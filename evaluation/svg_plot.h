@@ -31,6 +31,9 @@ struct PlotAxis {
   std::vector<std::string> categories{};  ///< If any: x is an index into them.
 };
 
+/// An axis of shares from 0, 50, 80 or 90 % on, so that no point or interval lies below.
+[[nodiscard]] PlotAxis shareAxis(const std::string& title, const std::vector<PlotSeries>& series);
+
 /// Points, joined by lines or not, with whiskers for intervals. Points outside the axes are clamped
 /// to them.
 [[nodiscard]] std::string linePlot(const std::string& title,

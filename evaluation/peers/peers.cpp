@@ -57,6 +57,7 @@ struct PeerDetector::Impl {
   Segments segments;
 
   Impl(const Camera& its_camera, const std::string& name) : camera(its_camera) {
+    cv::setNumThreads(1);
     if (name == "lsd") {
       lsd = cv::createLineSegmentDetector();
     } else if (name == "edlines") {

@@ -22,7 +22,8 @@ namespace dlsd {
 /// degrees there is no pinhole image at all. The paper gives 130 degrees as the limit in practice.
 inline constexpr double kPeerMaxFieldRad = 130 * M_PI / 180;
 
-/// One detector for the images of one camera. Not for use by two threads at once.
+/// One detector for the images of one camera. Not for use by two threads at once. From now on
+/// OpenCV uses one thread in the whole program: frames go in parallel, and times are of one thread.
 class PeerDetector {
  public:
   /// Throws InputError if there is no detector of that name, or the camera does not look along its
