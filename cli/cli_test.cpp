@@ -396,7 +396,8 @@ TEST_F(Cli, BadDataAndDetectionsAreTwo) {
   expectRefused("evaluate --data data --timeout 5", 2, "--command");
   expectRefused("evaluate --data data --detector lsd,dlsd,lsd", 2, "lsd twice");
   expectRefused("evaluate --data data --out x", 2, "--experiment");
-  expectRefused("evaluate --data data --frames 7", 2, "--experiment");
+  expectRefused("evaluate --data data --frames 7", 2, "--");
+  expectRefused("evaluate --experiment dlsd-paper --out x --data data --frames 7", 2, "--data");
   expectRefused("evaluate --experiment dlsd-paper --out x --min-recall 0.5@1", 2, "--min-recall");
   expectRefused("evaluate --experiment dlsd-paper --out x --report r", 2, "--report");
   expectRefused("evaluate --data data --curve spline", 2, "spline");

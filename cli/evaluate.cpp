@@ -416,10 +416,11 @@ int run(Arguments& arguments) {
 Run addEvaluate(CLI::App& command) {
   const auto arguments = std::make_shared<Arguments>();
   const auto each = [](CLI::Option* option) { return option->expected(1)->take_all(); };
-  each(command.add_option("--data",
-                          arguments->data,
-                          "Dataset folder; may be repeated: all are evaluated together"))
-      ->type_name("DIR");
+  auto* data =
+      each(command.add_option("--data",
+                              arguments->data,
+                              "Dataset folder; may be repeated: all are evaluated together"))
+          ->type_name("DIR");
   auto* detections = each(command.add_option("--detections",
                                              arguments->detections,
                                              "Detections of any program, one JSON object per line; "
@@ -509,7 +510,8 @@ Run addEvaluate(CLI::App& command) {
   command.add_option("--frames", arguments->frames, "Frames of the experiment's sequence")
       ->capture_default_str()
       ->transform(wholeNumber(1, 10000000))
-      ->needs(experiment);
+      ->needs(experiment)
+      ->excludes(data);
   command.add_option("--out", arguments->out, "Folder for the experiment's page, tables and data")
       ->type_name("DIR")
       ->needs(experiment);
