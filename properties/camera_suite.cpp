@@ -348,6 +348,11 @@ TEST_P(CameraSuite, ValidOneWayImpliesValidBack) {
       ++rays;
       // At a fold, the pixel is within rounding of the bound long before the ray is.
       if (!camera.unproject(*pixel) && !camera.unproject(pulledIn(camera, *pixel))) {
+        // A pixel of the oddest cameras is too coarse to tell the ray from the bound.
+        const auto J = camera.jacobian(ray);
+        const double resolution =
+            J ? 8 * pixelUlp(camera, *pixel) / singularValues(*J).smallest : 0.0;
+        if (camera.maxFieldAngle() - fieldAngle(ray) <= resolution) continue;
         RC_FAIL(describe(camera, ray));
       }
     }
