@@ -32,6 +32,7 @@
 #include "synth/render.h"
 #include "synth/scene.h"
 #include "synth/shading.h"
+#include "synth/shadows.h"
 
 namespace dlsd {
 namespace {
@@ -117,8 +118,9 @@ Frame makeFrame(const GenerateOptions& options,
                 const CameraRays& rays,
                 const PixelResponse& response) {
   const auto& [name, camera] = options.cameras[index % options.cameras.size()];
-  const SceneView view = makeSceneView(options.scene, options.seed, index);
+  SceneView view = makeSceneView(options.scene, options.seed, index);
   const Raycaster raycaster(view.scene);
+  addShadowEdges(raycaster, &view.scene);
   const Shader shader(view.scene, &raycaster);
   const std::vector<EdgeSpan> spans = visibleSpans(view.scene, raycaster, camera, view.pose);
   Labels labels =

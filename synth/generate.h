@@ -41,14 +41,14 @@ struct GenerateResult {
 };
 
 /// Writes images/NNNNNN.png, labels/NNNNNN.json, planes/KIND/NNNNNN.npy, cameras/NAME.yaml and,
-/// last, the manifest. Every file is written atomically; its bytes depend on the options but not on jobs, shards or earlier
-/// runs. Until then journal.txt (of a shard: journal-i-of-n.txt) names the frames that are
-/// finished, with their sha256, so that an interrupted or killed run goes on where it was. Frames
-/// that a manifest or journal of the same configuration names are verified by sha256 and kept;
-/// those that are missing or differ are made again. Throws std::invalid_argument (check()),
-/// InputError if the folder holds another dataset or an unfinished one of another configuration,
-/// SystemError if a file can't be written. on_progress may be empty; it is called by one thread at
-/// a time; what it throws ends the run.
+/// last, the manifest. Every file is written atomically; its bytes depend on the options but not on
+/// jobs, shards or earlier runs. Until then journal.txt (of a shard: journal-i-of-n.txt) names the
+/// frames that are finished, with their sha256, so that an interrupted or killed run goes on where
+/// it was. Frames that a manifest or journal of the same configuration names are verified by sha256
+/// and kept; those that are missing or differ are made again. Throws std::invalid_argument
+/// (check()), InputError if the folder holds another dataset or an unfinished one of another
+/// configuration, SystemError if a file can't be written. on_progress may be empty; it is called by
+/// one thread at a time; what it throws ends the run.
 GenerateResult generateDataset(const GenerateOptions& options,
                                const std::function<void(const GenerateProgress&)>& on_progress);
 

@@ -4,9 +4,12 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <optional>
+#include <set>
 
 #include "synth/dataset/statistics.h"
+#include "synth/shadows.h"
 
 namespace dlsd {
 namespace {
@@ -187,6 +190,7 @@ class View {
       case EdgeSource::kFaces:
         return height(edge.face0) > -kInPlane || height(edge.face1) > -kInPlane;
       case EdgeSource::kDecal:
+      case EdgeSource::kShadow:
         return height(edge.face0) > 0;
       case EdgeSource::kRodCentre:
         return true;
@@ -260,19 +264,65 @@ double roundPixel(double x) {
   return std::round(x * 1e6) / 1e6;
 }
 
-/// Width in px of a rod at an angle of its centre line's arc; 0 outside the domain.
+/// Width in px of a rod at a fraction of its centre line; 0 outside the domain.
 double rodWidthPx(const Scene& scene,
                   const Camera& camera,
                   const Edge& centre_line,
                   const EdgeArc& arc,
                   const Segment& segment,
-                  double phi) {
+                  double fraction) {
   const Eigen::Vector3d d = segment.to - segment.from;
-  const auto J = camera.jacobian(segment.from + fractionAt(arc, segment, phi) * d);
+  const auto J = camera.jacobian(segment.from + fraction * d);
   if (!J) return 0;
   const double radius = scene.rods[static_cast<size_t>(centre_line.rod)].radius;
   const Eigen::Vector2d along = (*J * d).normalized();
   const Eigen::Vector2d across = *J * (2 * radius * arc.normal);
+  return std::abs(along.x() * across.y() - along.y() * across.x());
+}
+
+/// The middle of a rod's shadow.
+bool isShadowOfCentre(const Scene& scene, const Edge& edge) {
+  return edge.source == EdgeSource::kShadow &&
+         scene.edges[static_cast<size_t>(edge.caster)].source == EdgeSource::kRodCentre;
+}
+
+/// Both borders of a rod's shadow, camera frame, where the given point (world) is in its middle.
+std::optional<std::array<Eigen::Vector3d, 2>> shadowSides(const Scene& scene,
+                                                          const Pose& pose,
+                                                          const Edge& middle,
+                                                          const Eigen::Vector3d& point) {
+  const Light& light = scene.lights[static_cast<size_t>(middle.light)];
+  const Edge& caster = scene.edges[static_cast<size_t>(middle.caster)];
+  const Face& face = scene.faces[static_cast<size_t>(middle.face0)];
+  const Eigen::Vector3d d = caster.to - caster.from;
+  const Eigen::Vector3d ray =
+      light.kind == Light::Kind::kSun ? light.place : Eigen::Vector3d(light.place - point);
+  const Eigen::Vector3d normal = d.cross(ray).normalized();  // Of the plane that holds them all.
+  const Eigen::Vector3d across = normal.cross(ray);
+  const double s = std::clamp(across.dot(point - caster.from) / across.dot(d), 0.0, 1.0);
+  const double radius = scene.rods[static_cast<size_t>(middle.rod)].radius;
+  std::array<Eigen::Vector3d, 2> sides;
+  for (size_t k = 0; k < 2; ++k) {
+    const auto side =
+        shadowOnFace(light, caster.from + s * d + (k == 0 ? radius : -radius) * normal, face);
+    if (!side) return std::nullopt;
+    sides[k] = pose.toCam(*side);
+  }
+  return sides;
+}
+
+/// Width in px of a rod's shadow at a point (world) of its middle; 0 outside the domain.
+double shadowWidthPx(const Scene& scene,
+                     const Camera& camera,
+                     const Pose& pose,
+                     const Edge& middle,
+                     const Eigen::Vector3d& point) {
+  const auto sides = shadowSides(scene, pose, middle, point);
+  const auto J = camera.jacobian(pose.toCam(point));
+  if (!sides || !J) return 0;
+  const Eigen::Vector2d along =
+      (*J * (pose.cam_from_world * (middle.to - middle.from))).normalized();
+  const Eigen::Vector2d across = *J * ((*sides)[0] - (*sides)[1]);
   return std::abs(along.x() * across.y() - along.y() * across.x());
 }
 
@@ -281,6 +331,46 @@ double rodWidthPx(const Scene& scene,
 double shareLeftByBlur(double width_px, double psf_sigma_px) {
   const double sigma = std::sqrt(psf_sigma_px * psf_sigma_px + 1.0 / 12);
   return std::erf(width_px / (2 * std::sqrt(2.0) * sigma));
+}
+
+/// Calls function(fraction of the edge) at kWidthPoints points of each imaged piece of an edge,
+/// hidden or not.
+template <class Function>
+void atWidthPoints(const Camera& camera,
+                   const EdgeArc& arc,
+                   const Segment& segment,
+                   const Function& function) {
+  for (const ImageSpan& span : imageSpans(camera, arc.arc)) {
+    for (int k = 0; k < kWidthPoints; ++k) {
+      const double t = span.t0 + (span.t1 - span.t0) * k / (kWidthPoints - 1);
+      function(fractionAt(arc, segment, t * arc.angle));
+    }
+  }
+}
+
+/// Shadows of a rod, by (rod, light, face), that are labelled by their middle in this view.
+using StripeKey = std::array<int, 3>;
+StripeKey stripeKey(const Edge& edge) {
+  return {edge.rod, edge.light, edge.face0};
+}
+std::set<StripeKey> findThinShadows(const Scene& scene, const Camera& camera, const Pose& pose) {
+  std::map<StripeKey, double> widest;
+  for (size_t i = 0; i < scene.edges.size(); ++i) {
+    const Edge& edge = scene.edges[i];
+    if (!isShadowOfCentre(scene, edge)) continue;
+    const auto arc = edgeArc(scene, pose, static_cast<int>(i));
+    if (!arc) continue;
+    atWidthPoints(camera, *arc, segmentOf(edge, pose), [&](double s) {
+      double& width = widest.emplace(stripeKey(edge), 0).first->second;
+      const Eigen::Vector3d point = edge.from + s * (edge.to - edge.from);
+      width = std::max(width, shadowWidthPx(scene, camera, pose, edge, point));
+    });
+  }
+  std::set<StripeKey> thin;
+  for (const auto& [key, width] : widest) {
+    if (width < kThickRodPx) thin.insert(key);
+  }
+  return thin;
 }
 
 /// Per rod: labelled by its centre line in this view?
@@ -293,12 +383,9 @@ std::vector<char> findWires(const Scene& scene, const Camera& camera, const Pose
     if (!arc) continue;
     const Segment segment = segmentOf(edge, pose);
     double widest = -1;
-    for (const ImageSpan& span : imageSpans(camera, arc->arc)) {
-      for (int k = 0; k < kWidthPoints; ++k) {
-        const double t = span.t0 + (span.t1 - span.t0) * k / (kWidthPoints - 1);
-        widest = std::max(widest, rodWidthPx(scene, camera, edge, *arc, segment, t * arc->angle));
-      }
-    }
+    atWidthPoints(camera, *arc, segment, [&](double s) {
+      widest = std::max(widest, rodWidthPx(scene, camera, edge, *arc, segment, s));
+    });
     wires[static_cast<size_t>(edge.rod)] = widest >= 0 && widest < kThickRodPx ? 1 : 0;
   }
   return wires;
@@ -390,6 +477,7 @@ Labels makeLabels(const Scene& scene,
                   const std::vector<EdgeSpan>& spans) {
   const View view(scene, raycaster, pose);
   const std::vector<char> wires = findWires(scene, camera, pose);
+  const std::set<StripeKey> thin_shadows = findThinShadows(scene, camera, pose);
   const Eigen::Vector3f origin = pose.position_in_world.cast<float>();
   const Eigen::Matrix3d world_from_cam = pose.cam_from_world.transpose();
   struct Look {
@@ -414,7 +502,13 @@ Labels makeLabels(const Scene& scene,
   for (const EdgeSpan& span : spans) {
     const Edge& edge = scene.edges[static_cast<size_t>(span.edge)];
     const bool is_wire = edge.source == EdgeSource::kRodCentre;
-    if (edge.rod >= 0 && (wires[static_cast<size_t>(edge.rod)] != 0) != is_wire) continue;
+    const bool is_shadow = edge.source == EdgeSource::kShadow;
+    const bool is_middle = is_wire || isShadowOfCentre(scene, edge);
+    if (edge.rod >= 0) {
+      const bool is_thin = is_shadow ? thin_shadows.contains(stripeKey(edge))
+                                     : wires[static_cast<size_t>(edge.rod)] != 0;
+      if (is_thin != is_middle) continue;
+    }
     const auto arc = edgeArc(scene, pose, span.edge);
     if (!arc) continue;
     const Segment segment = segmentOf(edge, pose);
@@ -440,16 +534,26 @@ Labels makeLabels(const Scene& scene,
     for (int k = 0; k < kContrastPoints; ++k) {
       const double phi = span.phi0 + line.angle_rad * (k + 0.5) / kContrastPoints;
       const Eigen::Vector3d ray = arc->at(phi);
-      double offset = kContrastOffsetRad;
+      // The rays on both sides of the line, or of the stripe of which it is the middle.
+      std::array<Eigen::Vector3d, 2> sides{ray, ray};
+      double offset = kContrastOffsetRad, width_px = 0;
       if (is_wire) {
         const double sine = scene.rods[static_cast<size_t>(edge.rod)].radius / pointAt(phi).norm();
         offset += std::asin(std::min(1.0, sine));
+        width_px = rodWidthPx(scene, camera, edge, *arc, segment, fractionAt(*arc, segment, phi));
+      } else if (is_middle) {
+        const Eigen::Vector3d point =
+            edge.from + fractionAt(*arc, segment, phi) * (edge.to - edge.from);
+        if (const auto borders = shadowSides(scene, pose, edge, point)) {
+          sides = {(*borders)[0].normalized(), (*borders)[1].normalized()};
+          if (sides[0].dot(arc->normal) < 0) std::swap(sides[0], sides[1]);
+        }
+        width_px = shadowWidthPx(scene, camera, pose, edge, point);
       }
-      const Look left = look(ray + std::tan(offset) * arc->normal);
-      const Look right = look(ray - std::tan(offset) * arc->normal);
+      const Look left = look(sides[0] + std::tan(offset) * arc->normal);
+      const Look right = look(sides[1] - std::tan(offset) * arc->normal);
       double contrast = std::abs(left.grey - right.grey);
-      if (is_wire) {
-        const double width_px = rodWidthPx(scene, camera, edge, *arc, segment, phi);
+      if (is_middle) {
         contrast = std::abs(look(ray).grey - (left.grey + right.grey) / 2) *
                    shareLeftByBlur(width_px, sensor.psf_sigma_px);
       }
@@ -462,6 +566,8 @@ Labels makeLabels(const Scene& scene,
     }
     if (is_wire) {
       line.kind = LineKind::kWire;
+    } else if (is_shadow) {
+      line.kind = LineKind::kShadow;
     } else if (edge.source == EdgeSource::kDecal) {
       line.kind = LineKind::kMaterial;
     } else {

@@ -52,9 +52,10 @@ struct Labels {
 /// Rods: the width in px, 2 * radius seen across the centre line, is taken at 17 points of each
 /// imaged piece of the centre line (hidden or not); if the largest is >= kThickRodPx, or nothing of
 /// the centre line is in the image, the rod is labelled by its prism edges, else by its centre
-/// line.
+/// line. A rod's shadow on a face likewise: by its borders or its middle.
 ///
-/// Kind: decal borders are `material`, centre lines `wire`. An edge of two faces is `crease` if
+/// Kind: decal borders are `material`, centre lines `wire`, borders of shadows `shadow` (present if
+/// the scene's edges hold them, see shadows.h). An edge of two faces is `crease` if
 /// both look at the camera, or where both sides of it in the image show faces that contain it (its
 /// own and the surface on which the solid stands), else `silhouette`.
 ///
@@ -62,7 +63,7 @@ struct Labels {
 /// between rays 2e-4 rad to both sides, at 11 points spread evenly over the span. For wires:
 /// between the centre and the mean of both sides of the rod, times what pixel and optical blur
 /// leave of it in the middle of a stripe of that width, erf(width / (2 sqrt(2) sqrt(psf_sigma^2 +
-/// 1/12))).
+/// 1/12))); for the middles of shadows likewise.
 [[nodiscard]] Labels makeLabels(const Scene& scene,
                                 const Raycaster& raycaster,
                                 const Shader& shader,

@@ -1,13 +1,13 @@
 // Preset "polyhedra": random solids in the open, inside a hall so large that its walls are a plain
 // background.
 
-#include <Eigen/Geometry>
 #include <array>
 #include <cmath>
 #include <vector>
 
 #include "synth/dataset/random.h"
 #include "synth/presets.h"
+#include "synth/random_shapes.h"
 #include "synth/scene_builder.h"
 
 namespace dlsd {
@@ -93,16 +93,6 @@ Shape drawShape(Random* random) {
     return prism(base, z);
   }
   return pyramid(random->nextInt(3, 5), z);
-}
-
-Vector3d drawDirection(Random* random) {
-  const double z = random->next(-1, 1), a = random->next(0, 2 * M_PI);
-  const double r = std::sqrt(1 - z * z);
-  return {r * std::cos(a), r * std::sin(a), z};
-}
-
-Eigen::Matrix3d drawRotation(Random* random) {
-  return Eigen::AngleAxisd(random->next(0, 2 * M_PI), drawDirection(random)).toRotationMatrix();
 }
 
 /// What a solid covers of the view.

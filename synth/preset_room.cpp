@@ -838,45 +838,7 @@ class RoomMaker {
         links.push_back({at, static_cast<size_t>((k + 1) % corners + 2)});
       }
     }
-    addJointedRods(nodes, links, radius, metal);
-  }
-
-  /// Rods along the links; each node's rods end where they would enter each other, under a ball.
-  void addJointedRods(const std::vector<Vector3d>& nodes,
-                      std::vector<std::array<size_t, 2>> links,
-                      double radius,
-                      const Surface& surface) {
-    constexpr double kLeastAngle = 0.55;
-    const auto direction = [&](const std::array<size_t, 2>& link, size_t from) -> Vector3d {
-      const size_t to = link[0] == from ? link[1] : link[0];
-      return (nodes[to] - nodes[from]).normalized();
-    };
-    // Least angle at each node; a link that makes too sharp a corner is left out.
-    std::vector<double> least(nodes.size(), M_PI);
-    std::vector<std::array<size_t, 2>> kept;
-    for (const auto& link : links) {
-      std::array<double, 2> angle{M_PI, M_PI};
-      for (const auto& other : kept) {
-        for (size_t k = 0; k < 2; ++k) {
-          if (other[0] != link[k] && other[1] != link[k]) continue;
-          const double cosine = direction(link, link[k]).dot(direction(other, link[k]));
-          angle[k] = std::min(angle[k], std::acos(std::clamp(cosine, -1.0, 1.0)));
-        }
-      }
-      if (std::min(angle[0], angle[1]) < kLeastAngle) continue;
-      kept.push_back(link);
-      for (size_t k = 0; k < 2; ++k) least[link[k]] = std::min(least[link[k]], angle[k]);
-    }
-    const auto offset = [&](size_t node) {
-      return radius * std::max(2.0, 1.05 / std::tan(least[node] / 2));
-    };
-    for (size_t n = 0; n < nodes.size(); ++n) {
-      builder_.addSphere(nodes[n], std::hypot(offset(n), radius) + 0.2 * radius, surface);
-    }
-    for (const auto& [a, b] : kept) {
-      const Vector3d d = (nodes[b] - nodes[a]).normalized();
-      builder_.addRod(nodes[a] + offset(a) * d, nodes[b] - offset(b) * d, radius, 4, surface);
-    }
+    builder_.addJointedRods(nodes, links, radius, metal);
   }
 
   // --- On walls and ceiling --------------------------------------------------------------------

@@ -80,6 +80,10 @@ TEST(Presets, AreFrozen) {
       {"room/1", "696f0c889ec57beab9896897de4688e319af69d6977ddcb648e9bf610fc39bc9"},
       {"paper/1", "82e168e233c851f9de6825822fd29cbccd8d0409029fafd4ae1b25652d15b196"},
       {"polyhedra/1", "5cef4e0597b15b47e96a2d43e68e1cd3779039200499c91975e987b7c2fda9ee"},
+      {"wires/1", "5aeb4a213c2b35dcc828cdfb4dd4b4369d683762b0179fdbb53561eac3b2710c"},
+      {"corridor/1", "039c248772c695078e0fd715cd5f67697fd63051b882c0b8f700344a251620c2"},
+      {"facade/1", "4a5497cb2f5dd6a676dba3eed006034c09a40827acc1ed8e49a19bd7562cefc1"},
+      {"checkerboard/1", "0f56396493ae6e8f70b6298e13753e9aaafe5325bcfe308f3c993842b79819e5"},
   };
   ASSERT_EQ(golden.size(), scenePresets().size());
   for (const std::string& preset : scenePresets()) {

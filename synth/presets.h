@@ -10,6 +10,10 @@ namespace dlsd {
 inline constexpr std::string_view kRoomVersion = "room/1";
 inline constexpr std::string_view kPaperVersion = "paper/1";
 inline constexpr std::string_view kPolyhedraVersion = "polyhedra/1";
+inline constexpr std::string_view kWiresVersion = "wires/1";
+inline constexpr std::string_view kCorridorVersion = "corridor/1";
+inline constexpr std::string_view kFacadeVersion = "facade/1";
+inline constexpr std::string_view kCheckerboardVersion = "checkerboard/1";
 
 /// A furnished room, another one for each (seed, index), seen from somewhere inside.
 [[nodiscard]] SceneView makeRoom(uint64_t seed, uint64_t index);
@@ -20,5 +24,21 @@ inline constexpr std::string_view kPolyhedraVersion = "polyhedra/1";
 /// Random solids in the open, all around the camera: boxes, prisms, pyramids and L-shaped blocks,
 /// most of them clear of each other in the picture. Another set for each (seed, index).
 [[nodiscard]] SceneView makePolyhedra(uint64_t seed, uint64_t index);
+
+/// Free-standing wireframes of random polyhedra, thin rods with balls at the corners, all around
+/// the camera in a large plain hall. Another set for each (seed, index).
+[[nodiscard]] SceneView makeWires(uint64_t seed, uint64_t index);
+
+/// A corridor with doors, handrails, tiles, lamps and boxes; its long lines pass the camera to
+/// behind it. Two lamps, most of the time with shadows. Another one for each (seed, index).
+[[nodiscard]] SceneView makeCorridor(uint64_t seed, uint64_t index);
+
+/// A house front of repeated windows and balconies under a sun that casts shadows, seen from the
+/// paved place before it. Another one for each (seed, index).
+[[nodiscard]] SceneView makeFacade(uint64_t seed, uint64_t index);
+
+/// Calibration boards around the camera, black squares on white, in a plain hall with a lamp that
+/// casts shadows. Other boards for each (seed, index).
+[[nodiscard]] SceneView makeCheckerboard(uint64_t seed, uint64_t index);
 
 }  // namespace dlsd

@@ -51,6 +51,10 @@ constexpr Preset kPresets[] = {
     {kRoomVersion, makeRoom},
     {kPaperVersion, makePaper},
     {kPolyhedraVersion, makePolyhedra},
+    {kWiresVersion, makeWires},
+    {kCorridorVersion, makeCorridor},
+    {kFacadeVersion, makeFacade},
+    {kCheckerboardVersion, makeCheckerboard},
 };
 
 const Preset& presetByName(std::string_view name) {

@@ -81,15 +81,17 @@ enum class EdgeSource {
   kFaces,      ///< Where two faces meet.
   kDecal,      ///< Straight border of a decal.
   kRodCentre,  ///< Centre line of a rod.
+  kShadow,     ///< Border of a shadow on a face (shadows.h); of rods also its middle.
 };
 
 /// A straight edge that labels may show.
 struct Edge {
   Eigen::Vector3d from, to;
   EdgeSource source = EdgeSource::kFaces;
-  int face0 = -1, face1 = -1;  ///< kFaces: both; kDecal: face0; kRodCentre: none.
-  int rod = -1;                ///< The rod that it belongs to, or -1.
-  int carrier = 0;             ///< Edges on one infinite line share it.
+  int face0 = -1, face1 = -1;   ///< kFaces: both; kDecal, kShadow: face0; kRodCentre: none.
+  int rod = -1;                 ///< The rod that it belongs to (kShadow: that casts it), or -1.
+  int carrier = 0;              ///< Edges on one infinite line share it.
+  int caster = -1, light = -1;  ///< kShadow: the edge and the light whose shadow it is.
 };
 
 /// A light for Lambert surfaces.
@@ -155,9 +157,9 @@ struct SceneView {
 [[nodiscard]] const std::vector<std::string>& scenePresets();
 /// "room/1": changes whenever the same seed gives another scene.
 [[nodiscard]] std::string presetVersion(std::string_view preset);
-/// Frame `index` of a preset, a function of its arguments only. `room`: another room each index.
-/// `paper`: one table per seed, index is time at 10 Hz along a smooth path.
-/// Throws std::invalid_argument for an unknown preset.
+/// Frame `index` of a preset, a function of its arguments only. `paper`: one table per seed, index
+/// is time at 10 Hz along a smooth path; all others: another scene each index. Throws
+/// std::invalid_argument for an unknown preset.
 [[nodiscard]] SceneView makeSceneView(std::string_view preset, uint64_t seed, uint64_t index);
 
 }  // namespace dlsd

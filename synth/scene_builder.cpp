@@ -302,6 +302,43 @@ void SceneBuilder::addRod(const Eigen::Vector3d& from,
   scene.pieces.push_back({(from + to) / 2, axes, {half, half, (to - from).norm() / 2}, solid_++});
 }
 
+void SceneBuilder::addJointedRods(const std::vector<Eigen::Vector3d>& nodes,
+                                  const std::vector<std::array<size_t, 2>>& links,
+                                  double radius,
+                                  const Surface& surface) {
+  constexpr double kLeastAngle = 0.55;
+  const auto direction = [&](const std::array<size_t, 2>& link, size_t from) -> Eigen::Vector3d {
+    const size_t to = link[0] == from ? link[1] : link[0];
+    return (nodes[to] - nodes[from]).normalized();
+  };
+  // Least angle at each node; a link that makes too sharp a corner is left out.
+  std::vector<double> least(nodes.size(), M_PI);
+  std::vector<std::array<size_t, 2>> kept;
+  for (const auto& link : links) {
+    std::array<double, 2> angle{M_PI, M_PI};
+    for (const auto& other : kept) {
+      for (size_t k = 0; k < 2; ++k) {
+        if (other[0] != link[k] && other[1] != link[k]) continue;
+        const double cosine = direction(link, link[k]).dot(direction(other, link[k]));
+        angle[k] = std::min(angle[k], std::acos(std::clamp(cosine, -1.0, 1.0)));
+      }
+    }
+    if (std::min(angle[0], angle[1]) < kLeastAngle) continue;
+    kept.push_back(link);
+    for (size_t k = 0; k < 2; ++k) least[link[k]] = std::min(least[link[k]], angle[k]);
+  }
+  const auto offset = [&](size_t node) {
+    return radius * std::max(2.0, 1.05 / std::tan(least[node] / 2));
+  };
+  for (size_t n = 0; n < nodes.size(); ++n) {
+    addSphere(nodes[n], std::hypot(offset(n), radius) + 0.2 * radius, surface);
+  }
+  for (const auto& [a, b] : kept) {
+    const Eigen::Vector3d d = (nodes[b] - nodes[a]).normalized();
+    addRod(nodes[a] + offset(a) * d, nodes[b] - offset(b) * d, radius, 4, surface);
+  }
+}
+
 void SceneBuilder::addSphere(const Eigen::Vector3d& centre, double radius, const Surface& surface) {
   scene.spheres.push_back({centre.cast<float>(), static_cast<float>(radius), addSurface(surface)});
 }
@@ -392,7 +429,7 @@ std::array<PanelFaces, 6> SceneBuilder::addRoom(const Eigen::Vector3d& size,
   return faces;
 }
 
-void SceneBuilder::finish() {
+void numberCarriers(std::vector<Edge>* edges) {
   // Edges on one line have nearly the same value of a fixed generic function of the line; only
   // neighbours in that order are compared.
   constexpr double kWindow = 2e-3;
@@ -401,8 +438,8 @@ void SceneBuilder::finish() {
     size_t edge;
   };
   std::vector<Key> keys;
-  for (size_t i = 0; i < scene.edges.size(); ++i) {
-    const Edge& e = scene.edges[i];
+  for (size_t i = 0; i < edges->size(); ++i) {
+    const Edge& e = (*edges)[i];
     const Eigen::Vector3d u = (e.to - e.from).normalized();
     const Eigen::Vector3d m = e.from - u * u.dot(e.from);
     // |u . c| has no sign, as a line has none.
@@ -413,7 +450,7 @@ void SceneBuilder::finish() {
   std::sort(keys.begin(), keys.end(), [](const Key& a, const Key& b) {
     return a.value != b.value ? a.value < b.value : a.edge < b.edge;
   });
-  std::vector<size_t> leader(scene.edges.size());
+  std::vector<size_t> leader(edges->size());
   for (size_t i = 0; i < leader.size(); ++i) leader[i] = i;
   const auto find = [&](size_t i) {
     while (leader[i] != i) i = leader[i];
@@ -422,15 +459,19 @@ void SceneBuilder::finish() {
   for (size_t i = 0; i < keys.size(); ++i) {
     for (size_t j = i + 1; j < keys.size() && keys[j].value - keys[i].value < kWindow; ++j) {
       const size_t a = find(keys[i].edge), b = find(keys[j].edge);
-      if (a == b || !sameLine(scene.edges[keys[i].edge], scene.edges[keys[j].edge])) continue;
+      if (a == b || !sameLine((*edges)[keys[i].edge], (*edges)[keys[j].edge])) continue;
       leader[std::max(a, b)] = std::min(a, b);
     }
   }
   std::map<size_t, int> numbers;
-  for (size_t i = 0; i < scene.edges.size(); ++i) {
+  for (size_t i = 0; i < edges->size(); ++i) {
     const auto [it, added] = numbers.emplace(find(i), static_cast<int>(numbers.size()));
-    scene.edges[i].carrier = it->second;
+    (*edges)[i].carrier = it->second;
   }
+}
+
+void SceneBuilder::finish() {
+  numberCarriers(&scene.edges);
 }
 
 }  // namespace dlsd

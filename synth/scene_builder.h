@@ -53,6 +53,9 @@ struct Print {
   Surface surface;
 };
 
+/// Gives edges on one infinite line one carrier, in the order of the edges.
+void numberCarriers(std::vector<Edge>* edges);
+
 class SceneBuilder {
  public:
   /// Front of a panel at z = `z` of the frame (x right, y up, z to the viewer), [0, width] x
@@ -95,6 +98,13 @@ class SceneBuilder {
               double radius,
               int sides,
               const Surface& surface);
+  /// Rods with 4 sides along the links (pairs of nodes); each node's rods end where they would
+  /// enter each other, under a ball of at most 4.2 radius. Links that make too sharp a corner with
+  /// an earlier one (0.55 rad) are left out.
+  void addJointedRods(const std::vector<Eigen::Vector3d>& nodes,
+                      const std::vector<std::array<size_t, 2>>& links,
+                      double radius,
+                      const Surface& surface);
   void addSphere(const Eigen::Vector3d& centre, double radius, const Surface& surface);
   void addDisc(const Eigen::Vector3d& centre,
                const Eigen::Vector3d& normal,
@@ -115,7 +125,7 @@ class SceneBuilder {
 
   Scene scene;
 
-  /// Numbers the carriers. Call once, last.
+  /// Numbers the carriers. Call last.
   void finish();
 
  private:

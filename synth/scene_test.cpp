@@ -27,7 +27,9 @@ std::vector<Named> scenes() {
   }
   for (uint64_t seed = 0; seed < 5; ++seed) {
     out.push_back({"paper " + std::to_string(seed), makeSceneView("paper", seed, 3)});
-    out.push_back({"polyhedra " + std::to_string(seed), makeSceneView("polyhedra", seed, 3)});
+    for (const std::string preset : {"polyhedra", "wires", "corridor", "facade", "checkerboard"}) {
+      out.push_back({preset + " " + std::to_string(seed), makeSceneView(preset, seed, 3)});
+    }
   }
   return out;
 }

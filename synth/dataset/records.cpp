@@ -130,7 +130,9 @@ ordered_json toJson(const LabelRecord& record) {
   }
   ordered_json junctions = ordered_json::array();
   for (const Junction& junction : record.junctions) {
-    junctions.push_back({{"point", vectorJson<2>(junction.point)}, {"lines", junction.lines}});
+    junctions.push_back({{"point", vectorJson<2>(junction.point)},
+                         {"degree", junction.lines.size()},
+                         {"lines", junction.lines}});
   }
   return {{"format", kLabelFormat},
           {"image", record.image},
@@ -192,6 +194,8 @@ LabelRecord labelRecordFromJson(const json& document, const std::string& source)
     for (const JsonField& id : field["lines"].array(2)) {
       junction.lines.push_back(id.integer(0, kMaxInt));
     }
+    const int lines = static_cast<int>(junction.lines.size());
+    (void)field["degree"].integer(lines, lines);
     record.junctions.push_back(std::move(junction));
   }
   return record;

@@ -1,0 +1,37 @@
+#pragma once
+// Borders of the shadows that straight edges cast on planes: straight edges, too.
+
+#include <optional>
+#include <vector>
+
+#include "synth/raycaster.h"
+#include "synth/scene.h"
+
+namespace dlsd {
+
+/// Where a place of an edge at `point` casts its shadow: the ray from the light through it meets
+/// the plane of a face. No value if the light does not fall onto the plane's front, or the plane
+/// lies before the point.
+[[nodiscard]] std::optional<Eigen::Vector3d> shadowOnFace(const Light& light,
+                                                          const Eigen::Vector3d& point,
+                                                          const Face& face);
+
+/// All shadow borders on faces: for each light that casts shadows and each edge at which a solid
+/// ends as seen from the light (one of its faces looks at the light, the other does not), the
+/// pieces that the light reaches, projected onto the face behind. Of rods the shadow of the centre
+/// line besides.
+///
+/// A shadow's border can only begin, end or change from one face to another where the edge, as seen
+/// from the light, crosses another edge or the outline of a sphere or disc, or enters a sphere.
+/// These places have closed forms; between two neighbours two ray tests decide: is the edge lit,
+/// and what lies behind it. What falls on spheres and discs is left out (no straight line, or no
+/// face).
+///
+/// Carriers are not numbered.
+[[nodiscard]] std::vector<Edge> shadowEdges(const Scene& scene, const Raycaster& raycaster);
+
+/// Appends them to the scene's edges and numbers all carriers anew; the old ones keep theirs unless
+/// a shadow's border continues one of them. Does nothing to a scene without such lights.
+void addShadowEdges(const Raycaster& raycaster, Scene* scene);
+
+}  // namespace dlsd
