@@ -5,6 +5,7 @@
 
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
+#include <algorithm>
 #include <charconv>
 #include <cstdint>
 #include <filesystem>
@@ -27,8 +28,41 @@ struct Arguments {
   std::string encoding = "linear";
   std::vector<std::string> planes;
   std::string verify;
+  std::string config;
+  bool print_config = false;
+  CameraVariety camera_variety;
   GenerateOptions options;
 };
+
+constexpr std::string_view kRandom = "random:";
+
+/// Adds the cameras that "random:MODEL" or "random:MODEL:N" stands for.
+void addRandomCameras(const std::string& text,
+                      const Arguments& arguments,
+                      GenerateOptions* options) {
+  std::string model = text.substr(kRandom.size());
+  int count = 8;
+  const size_t colon = model.find(':');
+  if (colon != std::string::npos) {
+    const char* end = model.data() + model.size();
+    const auto number = std::from_chars(model.data() + colon + 1, end, count);
+    if (number.ec != std::errc() || number.ptr != end || count < 1 || count > 10000) {
+      throw InputError("--camera is \"" + text +
+                       "\", allowed is random:MODEL:N with N from 1 to 10000");
+    }
+    model.resize(colon);
+  }
+  const auto& models = randomCameraModels();
+  if (std::find(models.begin(), models.end(), model) == models.end()) {
+    throw InputError(
+        fmt::format("--camera is \"{}\", allowed models are {}", text, fmt::join(models, ", ")));
+  }
+  for (int k = 0; k < count; ++k) {
+    options->cameras.emplace_back(
+        fmt::format("random-{}-{}", model, k),
+        drawCamera(model, arguments.camera_variety, options->seed, static_cast<uint64_t>(k)));
+  }
+}
 
 /// The name of a camera in the dataset: the file's stem, and the camera's name too if one is
 /// chosen.
@@ -75,12 +109,25 @@ int verify(const std::string& folder) {
 int run(Arguments& arguments) {
   GenerateOptions& options = arguments.options;
   if (!arguments.verify.empty()) return verify(arguments.verify);
+  if (!arguments.config.empty()) {
+    readVariety(arguments.config, &options.variety, &arguments.camera_variety);
+  }
+  if (arguments.print_config) {
+    const nlohmann::ordered_json config{{"scene", toJson(options.variety)},
+                                        {"camera", toJson(arguments.camera_variety)}};
+    print(config.dump(2) + "\n");
+    return kDone;
+  }
   for (const auto& [name, given] :
        {std::pair("--camera", !arguments.cameras.empty()), {"--out", !options.out.empty()}}) {
     if (!given) throw InputError(std::string(name) + " is required");
   }
   std::set<std::string> names;
   for (const std::string& path : arguments.cameras) {
+    if (path.starts_with(kRandom)) {
+      addRandomCameras(path, arguments, &options);
+      continue;
+    }
     options.cameras.emplace_back(nameOf(path), loadCamera(path));
     if (!names.insert(options.cameras.back().first).second) {
       throw InputError("--camera " + path + ": another camera is named \"" +
@@ -124,12 +171,21 @@ Run addGenerate(CLI::App& command) {
       .add_option(
           "--camera",
           arguments->cameras,
-          "Calibration file, or file:camera if it holds several; may be repeated: frames go "
-          "round")
+          fmt::format(
+              "Calibration file, or file:camera if it holds several, or random:MODEL:N for N "
+              "(8) random ones, of {}; may be repeated: frames go round",
+              fmt::join(randomCameraModels(), ", ")))
       ->type_name("FILE")
       ->expected(1)
       ->take_all();
   command.add_option("--out", options.out, "Folder for the dataset")->type_name("DIR");
+  command
+      .add_option("--config",
+                  arguments->config,
+                  "JSON file of ranges that scenes and random cameras are drawn from")
+      ->type_name("FILE");
+  command.add_flag(
+      "--print-config", arguments->print_config, "Print these ranges and do nothing else");
   command
       .add_option("--scene",
                   options.scene,
@@ -209,6 +265,9 @@ Run addGenerate(CLI::App& command) {
       "Examples:\n"
       "  dlsd generate --camera wide.yaml --count 100 --out data\n"
       "  dlsd generate --camera rig.yaml:cam0 --camera rig.yaml:cam1 --scene paper --noise 2 --out "
+      "data\n"
+      "  dlsd generate --camera random:kb:50 --config ranges.json --scene corridor --count 500 "
+      "--out "
       "data\n"
       "  dlsd generate --camera wide.yaml --planes depth,normal,df --out data\n"
       "  dlsd generate --camera wide.yaml --count 1000 --shard 0/4 --out data   (and 1/4, 2/4, "

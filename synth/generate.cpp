@@ -119,6 +119,7 @@ Frame makeFrame(const GenerateOptions& options,
                 const PixelResponse& response) {
   const auto& [name, camera] = options.cameras[index % options.cameras.size()];
   SceneView view = makeSceneView(options.scene, options.seed, index);
+  addVariety(options.variety, options.seed, index, &view);
   const Raycaster raycaster(view.scene);
   addShadowEdges(raycaster, &view.scene);
   const Shader shader(view.scene, &raycaster);
@@ -173,6 +174,7 @@ ordered_json configJson(const GenerateOptions& options) {
                       {"count", options.count},
                       {"sensor", toJson(options.sensor)},
                       {"cameras", std::move(cameras)}};
+  if (options.variety != SceneVariety()) config["variety"] = toJson(options.variety);
   for (const PlaneKind kind : options.planes) config["planes"].push_back(toString(kind));
   return config;
 }
@@ -426,6 +428,7 @@ void GenerateOptions::check() const {
   requireInt("jobs", jobs, 0, kMaxJobs);
   requireInt("shard_count", shard_count, 1, kMaxCount);
   requireInt("shard_index", shard_index, 0, shard_count - 1);
+  variety.check();
   sensor.check();
   for (size_t k = 0; k < planes.size(); ++k) {
     if (std::count(planes.begin(), planes.end(), planes[k]) > 1) {

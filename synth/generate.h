@@ -12,6 +12,7 @@
 #include "synth/dataset/records.h"
 #include "synth/planes.h"
 #include "synth/sensor.h"
+#include "synth/variety.h"
 
 namespace dlsd {
 
@@ -20,8 +21,9 @@ struct GenerateOptions {
   std::vector<std::pair<std::string, Camera>> cameras;
   std::string scene = "room";  ///< A preset: one of scenePresets() (scene.h).
   uint64_t seed = 0;
-  int count = 1;    ///< Frames, in [1, 10000000].
-  std::string out;  ///< Dataset folder; created if absent.
+  int count = 1;         ///< Frames, in [1, 10000000].
+  std::string out;       ///< Dataset folder; created if absent.
+  SceneVariety variety;  ///< On top of the preset.
   SensorOptions sensor;
   std::vector<PlaneKind> planes;  ///< Written besides images and labels; none twice.
   int jobs = 0;                   ///< Threads; 0 = all cores.

@@ -12,92 +12,13 @@
 #include "synth/render.h"
 #include "synth/scene_builder.h"
 #include "synth/test_cameras.h"
+#include "synth/visibility_oracle.h"
 
 namespace dlsd {
 namespace {
 
 using Eigen::Vector2d;
 using Eigen::Vector3d;
-
-/// Is the point of the edge hidden? Every triangle, sphere and disc is intersected in double;
-/// nothing of the label code or of Embree is used.
-class Oracle {
- public:
-  Oracle(const Scene& scene, const Vector3d& eye) : scene_(scene), eye_(eye) {
-    for (const Triangle& t : scene.triangles) {
-      Corners c;
-      for (size_t k = 0; k < 3; ++k) {
-        c.p[k] = scene.vertices[static_cast<size_t>(t.vertices[k])].cast<double>();
-      }
-      c.face = t.face;
-      triangles_.push_back(c);
-    }
-  }
-
-  [[nodiscard]] bool hidden(const Edge& edge, const Vector3d& point) const {
-    const Vector3d d = point - eye_;
-    constexpr double kBefore = 1 - 1e-8;
-    for (const Corners& t : triangles_) {
-      if (edge.source == EdgeSource::kRodCentre) {
-        const Rod& rod = scene_.rods[static_cast<size_t>(edge.rod)];
-        if (t.face >= rod.first_face && t.face < rod.first_face + rod.face_count) continue;
-      }
-      // Signed volumes: the segment goes through the triangle iff all three have one sign.
-      const Vector3d a = t.p[0] - eye_, b = t.p[1] - eye_, c = t.p[2] - eye_;
-      const double u = d.dot(a.cross(b)), v = d.dot(b.cross(c)), w = d.dot(c.cross(a));
-      if (!((u > 0 && v > 0 && w > 0) || (u < 0 && v < 0 && w < 0))) continue;
-      const double s = a.dot(b.cross(c)) / (u + v + w);
-      if (!(s > 0 && s < kBefore)) continue;
-      const Vector3d n = (t.p[1] - t.p[0]).cross(t.p[2] - t.p[0]).normalized();
-      const bool in_plane =
-          std::abs(n.dot(edge.from - t.p[0])) < 5e-6 && std::abs(n.dot(edge.to - t.p[0])) < 5e-6;
-      if (!in_plane) return true;
-    }
-    for (const Sphere& sphere : scene_.spheres) {
-      const Vector3d m = eye_ - sphere.centre.cast<double>();
-      const double r = static_cast<double>(sphere.radius);
-      const double a = d.squaredNorm(), b = m.dot(d), c = m.squaredNorm() - r * r;
-      const double disc = b * b - a * c;
-      if (disc <= 0) continue;
-      const double s = (-b - std::sqrt(disc)) / a;
-      if (s > 0 && s < kBefore) return true;
-    }
-    for (const Disc& disc : scene_.discs) {
-      const Vector3d n = disc.normal.cast<double>(), centre = disc.centre.cast<double>();
-      const double s = n.dot(centre - eye_) / n.dot(d);
-      if (s > 0 && s < kBefore &&
-          (eye_ + s * d - centre).norm() < static_cast<double>(disc.radius)) {
-        return true;
-      }
-    }
-    return false;
-  }
-
- private:
-  struct Corners {
-    std::array<Vector3d, 3> p;
-    int face = 0;
-  };
-  const Scene& scene_;
-  Vector3d eye_;
-  std::vector<Corners> triangles_;
-};
-
-bool looksAway(const Scene& scene, const Edge& edge, const Vector3d& eye) {
-  if (edge.source == EdgeSource::kRodCentre) return false;
-  bool away = true;
-  for (const int f : {edge.face0, edge.face1}) {
-    if (f < 0) continue;
-    const Face& face = scene.faces[static_cast<size_t>(f)];
-    away = away && face.normal.dot(eye - face.origin) <= 0;
-  }
-  return away;
-}
-
-/// Angle from `a` to `b`, accurate for small ones.
-double angleTo(const Vector3d& a, const Vector3d& b) {
-  return std::atan2(a.cross(b).norm(), a.dot(b));
-}
 
 // Visibility by events and one ray test each agrees with brute force at random points of random
 // edges.
@@ -109,7 +30,7 @@ TEST(VisibleSpans, AgreeWithBruteForce) {
       const Raycaster raycaster(view.scene);
       const auto spans = visibleSpans(view.scene, raycaster, camera, view.pose);
       const Vector3d eye = view.pose.position_in_world;
-      const Oracle oracle(view.scene, eye);
+      const VisibilityOracle oracle(view.scene, eye);
       std::vector<std::vector<const EdgeSpan*>> by_edge(view.scene.edges.size());
       for (const EdgeSpan& s : spans) by_edge[static_cast<size_t>(s.edge)].push_back(&s);
       Random random(11, index);
@@ -155,7 +76,7 @@ TEST(VisibleSpans, EndWhereBruteForceSaysSo) {
     const SceneView view = makeSceneView("room", 101, 2);
     const Raycaster raycaster(view.scene);
     const auto spans = visibleSpans(view.scene, raycaster, camera, view.pose);
-    const Oracle oracle(view.scene, view.pose.position_in_world);
+    const VisibilityOracle oracle(view.scene, view.pose.position_in_world);
     for (size_t k = 0; k < spans.size(); k += 3) {
       const EdgeSpan& span = spans[k];
       if (span.phi1 - span.phi0 < 20 * kStep) continue;
@@ -201,7 +122,7 @@ TEST(VisibleSpans, EndBehindBallsNearTheFarEndOfLongArcs) {
       builder.finish();
       const Scene scene = std::move(builder.scene);
       const Raycaster raycaster(scene);
-      const Oracle oracle(scene, Vector3d::Zero());
+      const VisibilityOracle oracle(scene, Vector3d::Zero());
       const auto spans = visibleSpans(scene, raycaster, camera, Pose{});
       for (size_t e = 0; e < scene.edges.size(); ++e) {
         const Edge& edge = scene.edges[e];

@@ -1,0 +1,381 @@
+// Labels and pictures over random scenes and cameras: where labels are, what hides them, and what
+// must not change when camera and scene are turned or mirrored together.
+//
+// RC_PARAMS (seed, max_success) is honoured; a case is a scene and a camera.
+
+#include <gtest/gtest.h>
+#include <rapidcheck.h>
+#include <rapidcheck/gtest.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <iostream>
+#include <limits>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "properties/gen.h"
+#include "synth/dataset/random.h"
+#include "synth/labels.h"
+#include "synth/render.h"
+#include "synth/shadows.h"
+#include "synth/variety.h"
+#include "synth/visibility_oracle.h"
+
+namespace dlsd {
+namespace {
+
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+
+// --- Cases ---
+
+struct Case {
+  std::string preset;
+  uint64_t seed, index;
+  bool distractors;
+};
+void showValue(const Case& c, std::ostream& out) {
+  out << c.preset << " seed " << c.seed << " index " << c.index
+      << (c.distractors ? " with round things" : "");
+}
+
+rc::Gen<Case> genCase() {
+  return rc::gen::map(rc::gen::tuple(rc::gen::elementOf(scenePresets()),
+                                     genInt(0, 1000),
+                                     genInt(0, 1000),
+                                     rc::gen::arbitrary<bool>()),
+                      [](const auto& t) {
+                        return Case{std::get<0>(t),
+                                    static_cast<uint64_t>(std::get<1>(t)),
+                                    static_cast<uint64_t>(std::get<2>(t)),
+                                    std::get<3>(t)};
+                      });
+}
+
+SceneView makeView(const Case& c) {
+  SceneView view = makeSceneView(c.preset, c.seed, c.index);
+  if (c.distractors) {
+    SceneVariety variety;
+    variety.distractors = {2, 5};
+    addVariety(variety, c.seed, c.index, &view);
+  }
+  return view;
+}
+
+/// A realistic camera of any model, of at most 0.3 megapixels.
+rc::Gen<Camera> genSmallCamera() {
+  CameraVariety variety;
+  variety.width_px = {320, 560};
+  return rc::gen::map(rc::gen::tuple(rc::gen::elementOf(randomCameraModels()), genInt(0, 100000)),
+                      [variety](const auto& t) {
+                        return drawCamera(
+                            std::get<0>(t), variety, 1, static_cast<uint64_t>(std::get<1>(t)));
+                      });
+}
+
+/// A scene with its shadows, and what a camera sees of it.
+struct Viewed {
+  Scene scene;
+  Pose pose;
+  Raycaster raycaster;
+  std::vector<EdgeSpan> spans;
+  Labels labels;
+
+  Viewed(Scene s, const Pose& p, const Camera& camera)
+      : scene(std::move(s)), pose(p), raycaster(scene) {
+    addShadowEdges(raycaster, &scene);
+    spans = visibleSpans(scene, raycaster, camera, pose);
+    const Shader shader(scene, &raycaster);
+    labels = makeLabels(scene, raycaster, shader, camera, pose, SensorOptions(), spans);
+  }
+  Viewed(const Viewed&) = delete;
+
+  [[nodiscard]] std::vector<float> render(const Camera& camera) const {
+    const Shader shader(scene, &raycaster);
+    return renderRadiance(
+               scene, raycaster, shader, CameraRays(camera), pose, spans, 1, PixelResponse(0.7, 0))
+        .radiance;
+  }
+};
+
+bool isInner(EndKind kind) {
+  return kind == EndKind::kVertex || kind == EndKind::kOccluder;
+}
+
+constexpr double kBesideRad = 1e-4;
+/// Contrast is stated from this many places spread evenly over a label's angle.
+constexpr int kContrastPlaces = 11;
+
+double distanceTo(const std::vector<Vector2d>& curve, const Vector2d& p) {
+  double nearest = std::numeric_limits<double>::infinity();
+  for (size_t i = 1; i < curve.size(); ++i) {
+    const Vector2d d = curve[i] - curve[i - 1];
+    const double length2 = d.squaredNorm();
+    const double t = length2 > 0 ? std::clamp((p - curve[i - 1]).dot(d) / length2, 0.0, 1.0) : 0;
+    nearest = std::min(nearest, (curve[i - 1] + t * d - p).norm());
+  }
+  return nearest;
+}
+
+// --- Properties ---
+
+// On both sides of a label's curve, 1e-4 rad off, grey levels differ by the label's least contrast.
+RC_GTEST_PROP(SynthSuite, LabelsLieOnDiscontinuities, ()) {
+  const Case c = *genCase();
+  const Camera camera = *genSmallCamera();
+  SceneView view = makeView(c);
+  const Viewed seen(std::move(view.scene), view.pose, camera);
+  const Shader shader(seen.scene, &seen.raycaster);
+  const Eigen::Matrix3d world_from_cam = seen.pose.cam_from_world.transpose();
+  const auto greyAlong = [&](const Vector3d& ray) {
+    const Vector3d direction = world_from_cam * ray.normalized();
+    const Hit hit = seen.raycaster.cast(seen.pose.position_in_world.cast<float>(),
+                                        direction.cast<float>(),
+                                        0,
+                                        std::numeric_limits<float>::infinity());
+    const float radiance = shader.shade(hit, seen.pose.position_in_world, direction).radiance;
+    return greyLevel(SensorOptions(), static_cast<double>(radiance));
+  };
+  int checked = 0, flat = 0;
+  for (const LabelLine& line : seen.labels.lines) {
+    const Edge& edge = seen.scene.edges[static_cast<size_t>(line.edge)];
+    const bool is_middle =
+        edge.source == EdgeSource::kRodCentre ||
+        (edge.source == EdgeSource::kShadow &&
+         seen.scene.edges[static_cast<size_t>(edge.caster)].source == EdgeSource::kRodCentre);
+    if (is_middle || line.contrast_min < 3) continue;
+    // One of the places at which contrast is stated, through the image.
+    const Vector3d from = line.points_in_cam[0].normalized();
+    const Vector3d side = from.cross(line.points_in_cam[1]).normalized().cross(from);
+    const double phi = line.angle_rad * (line.id % kContrastPlaces + 0.5) / kContrastPlaces;
+    const auto p = camera.project(std::cos(phi) * from + std::sin(phi) * side);
+    RC_ASSERT(p.has_value());
+    RC_ASSERT(distanceTo(line.points, *p) <= 0.0101);
+    const auto ray = camera.unproject(*p);
+    RC_ASSERT(ray.has_value());
+    const double left = greyAlong(*ray + kBesideRad * line.normal);
+    const double right = greyAlong(*ray - kBesideRad * line.normal);
+    ++checked;
+    if (std::abs(left - right) >= 0.95 * line.contrast_min - 0.5) continue;
+    ++flat;
+    RC_LOG() << "line " << line.id << " " << toString(line.kind) << " at " << p->transpose() << ": "
+             << left << " " << right << ", least contrast " << line.contrast_min << "\n";
+  }
+  RC_PRE(checked > 0);
+  RC_LOG() << flat << " of " << checked << " points";
+  RC_TAG(c.preset);
+  // Something thinner than that, or the next line nearer, may stand beside a point.
+  RC_ASSERT(flat <= 1 + checked / 100);
+}
+
+// A point of an edge is in a span if and only if brute force over all triangles, balls and discs
+// finds nothing before it.
+RC_GTEST_PROP(SynthSuite, VisibilityIsThatOfBruteForce, ()) {
+  const Case c = *genCase();
+  const Camera camera = *genSmallCamera();
+  SceneView view = makeView(c);
+  const Viewed seen(std::move(view.scene), view.pose, camera);
+  const Vector3d eye = seen.pose.position_in_world;
+  const VisibilityOracle oracle(seen.scene, eye);
+  std::vector<std::vector<const EdgeSpan*>> by_edge(seen.scene.edges.size());
+  for (const EdgeSpan& s : seen.spans) by_edge[static_cast<size_t>(s.edge)].push_back(&s);
+  Random random(c.seed, c.index);
+  int tested = 0;
+  for (int k = 0; k < 300; ++k) {
+    const int e = random.nextInt(0, static_cast<int>(seen.scene.edges.size()) - 1);
+    const double t = random.next(0, 1);
+    const Edge& edge = seen.scene.edges[static_cast<size_t>(e)];
+    const Vector3d point = edge.from + t * (edge.to - edge.from);
+    const Vector3d ray = seen.pose.toCam(point);
+    const auto pixel = camera.project(ray);
+    const bool expected = pixel && camera.inImage(*pixel) && !looksAway(seen.scene, edge, eye) &&
+                          !oracle.hidden(edge, point);
+    bool found = false;
+    double nearest_end = 1;
+    for (const EdgeSpan* s : by_edge[static_cast<size_t>(e)]) {
+      const double phi = angleTo(s->arc.from, ray);
+      found = found || (phi >= s->phi0 && phi <= s->phi1);
+      nearest_end = std::min({nearest_end, std::abs(phi - s->phi0), std::abs(phi - s->phi1)});
+    }
+    if (nearest_end < 2 * kShortestSpanRad) continue;  // At an end both answers are right.
+    ++tested;
+    if (found != expected) {
+      RC_LOG() << "edge " << e << " t " << t << ": span " << found << ", brute force " << expected;
+    }
+    RC_ASSERT(found == expected);
+  }
+  RC_ASSERT(tested > 200);
+}
+
+// What two cameras of one pose both see entirely are the same arcs.
+RC_GTEST_PROP(SynthSuite, ArcsAreThoseOfAnotherLens, ()) {
+  const Case c = *genCase();
+  const Camera one = *genSmallCamera(), other = *genSmallCamera();
+  SceneView view = makeView(c);
+  const Raycaster raycaster(view.scene);
+  addShadowEdges(raycaster, &view.scene);
+  std::multimap<int, const EdgeSpan*> by_edge;
+  const auto spans = visibleSpans(view.scene, raycaster, one, view.pose);
+  const auto others = visibleSpans(view.scene, raycaster, other, view.pose);
+  for (const EdgeSpan& s : others) by_edge.emplace(s.edge, &s);
+  int compared = 0;
+  for (const EdgeSpan& s : spans) {
+    const auto [first, last] = by_edge.equal_range(s.edge);
+    for (auto it = first; it != last; ++it) {
+      const EdgeSpan& o = *it->second;
+      if (o.phi0 > s.phi1 || o.phi1 < s.phi0) continue;
+      for (size_t end = 0; end < 2; ++end) {
+        if (!isInner(s.ends[end]) || !isInner(o.ends[end])) continue;
+        ++compared;
+        RC_ASSERT(s.ends[end] == o.ends[end]);
+        const double a = end == 0 ? s.phi0 : s.phi1, b = end == 0 ? o.phi0 : o.phi1;
+        RC_ASSERT(std::abs(a - b) <= 1e-9);
+      }
+    }
+  }
+  RC_PRE(compared > 0);
+}
+
+// --- Turned and mirrored ---
+
+/// A map of the world that floats survive.
+struct WorldMap {
+  Eigen::Matrix3d linear;
+  [[nodiscard]] Vector3d operator()(const Vector3d& p) const { return linear * p; }
+  [[nodiscard]] Eigen::Vector3f operator()(const Eigen::Vector3f& p) const {
+    return linear.cast<float>() * p;
+  }
+
+  [[nodiscard]] Scene of(Scene scene) const {
+    for (auto& v : scene.vertices) v = (*this)(v);
+    if (linear.determinant() < 0) turnRound(&scene);
+    for (Face& f : scene.faces) {
+      for (Vector3d* v : {&f.origin, &f.e1, &f.e2, &f.normal}) *v = (*this)(*v);
+    }
+    for (Sphere& s : scene.spheres) s.centre = (*this)(s.centre);
+    for (Disc& d : scene.discs) {
+      d.centre = (*this)(d.centre);
+      d.normal = (*this)(d.normal);
+    }
+    for (Rod& r : scene.rods) {
+      r.from = (*this)(r.from);
+      r.to = (*this)(r.to);
+    }
+    for (Edge& e : scene.edges) {
+      e.from = (*this)(e.from);
+      e.to = (*this)(e.to);
+    }
+    for (Light& l : scene.lights) l.place = (*this)(l.place);
+    return scene;
+  }
+
+  /// Corners of triangles in the other order, as mirrored normals want.
+  static void turnRound(Scene* scene) {
+    std::vector<char> is_rod_side(scene->faces.size(), 0);
+    for (const Rod& rod : scene->rods) {
+      std::fill_n(is_rod_side.begin() + rod.first_face, rod.face_count - 2, 1);
+    }
+    for (size_t t = 0; t < scene->triangles.size(); ++t) {
+      auto& first = scene->triangles[t].vertices;
+      if (is_rod_side[static_cast<size_t>(scene->triangles[t].face)] == 0) {
+        std::swap(first[1], first[2]);
+        continue;
+      }
+      // The ray caster cuts the sides of rods, pairs (a, b, c), (a, c, d), between a, b and c, d.
+      auto& second = scene->triangles[++t].vertices;
+      const auto [a, b, c] = first;
+      const int d = second[2];
+      first = {b, a, d};
+      second = {b, d, c};
+    }
+  }
+};
+
+void expectSameLabels(const Labels& a, const Labels& b, const auto& mapPixel) {
+  RC_ASSERT(a.lines.size() == b.lines.size());
+  for (size_t i = 0; i < a.lines.size(); ++i) {
+    const LabelLine &p = a.lines[i], &q = b.lines[i];
+    RC_ASSERT(p.edge == q.edge);
+    RC_ASSERT(p.kind == q.kind);
+    RC_ASSERT(p.ends == q.ends);
+    RC_ASSERT(std::abs(p.angle_rad - q.angle_rad) <= 1e-9);
+    // Where something begins within 2e-4 rad of the line, its contrast depends on the last bit.
+    RC_ASSERT(std::abs(p.contrast - q.contrast) <= 0.5 + 0.1 * p.contrast);
+    RC_ASSERT((mapPixel(p.points.front()) - q.points.front()).norm() <= 1e-5);
+    RC_ASSERT((mapPixel(p.points.back()) - q.points.back()).norm() <= 1e-5);
+  }
+  RC_ASSERT(a.junctions.size() == b.junctions.size());
+}
+
+// Camera and scene turned together by a quarter about the vertical (exact in floats): the same
+// labels, the same picture.
+RC_GTEST_PROP(SynthSuite, TurningSceneAndCameraChangesNothing, ()) {
+  const Case c = *genCase();
+  const Camera camera = *genSmallCamera();
+  const SceneView view = makeView(c);
+  WorldMap turn;
+  turn.linear << 0, -1, 0, 1, 0, 0, 0, 0, 1;
+  Pose turned_pose;
+  turned_pose.cam_from_world = view.pose.cam_from_world * turn.linear.transpose();
+  turned_pose.position_in_world = turn(view.pose.position_in_world);
+  const Viewed seen(view.scene, view.pose, camera),
+      turned(turn.of(view.scene), turned_pose, camera);
+  expectSameLabels(seen.labels, turned.labels, [](const Vector2d& p) { return p; });
+  const std::vector<float> image = seen.render(camera), turned_image = turned.render(camera);
+  size_t differ = 0;
+  for (size_t i = 0; i < image.size(); ++i) {
+    differ += std::abs(image[i] - turned_image[i]) * 255 <= 1 ? 0 : 1;
+  }
+  RC_LOG() << differ << " pixels differ";
+  RC_ASSERT(differ <= 2 + image.size() / 5000);
+}
+
+/// The camera that sees what this one sees in a mirror.
+Camera mirrored(const Camera& camera) {
+  auto params = camera.params();
+  const auto specs = camera.paramSpecs();
+  for (size_t i = 0; i < params.size(); ++i) {
+    if (specs[i].name == "cx") params[i] = camera.width() - 1 - params[i];
+  }
+  return makeCamera(
+      camera.modelName(), params, camera.width(), camera.height(), camera.maxFieldAngleLimit());
+}
+
+// A mirrored scene has the mirrored picture and the mirrored labels.
+RC_GTEST_PROP(SynthSuite, MirroredScenesAreMirrored, ()) {
+  const Case c = *genCase();
+  const Camera camera = *genSmallCamera();
+  const SceneView view = makeView(c);
+  const Eigen::Matrix3d flip = Vector3d(-1, 1, 1).asDiagonal();
+  const WorldMap mirror{flip};
+  Pose pose;
+  pose.cam_from_world = flip * view.pose.cam_from_world * flip;
+  pose.position_in_world = mirror(view.pose.position_in_world);
+  const Camera other = mirrored(camera);
+  const Viewed seen(view.scene, view.pose, camera), flipped(mirror.of(view.scene), pose, other);
+  const int width = camera.width();
+  expectSameLabels(seen.labels, flipped.labels, [&](const Vector2d& p) -> Vector2d {
+    return {width - 1 - p.x(), p.y()};
+  });
+  // Samples are not mirrored: pixels agree as well as 64 samples answer.
+  const std::vector<float> image = seen.render(camera), flipped_image = flipped.render(other);
+  size_t differ = 0;
+  for (int y = 0; y < camera.height(); ++y) {
+    for (int x = 0; x < width; ++x) {
+      const size_t row = static_cast<size_t>(y) * static_cast<size_t>(width);
+      const float a = image[row + static_cast<size_t>(x)];
+      const float b = flipped_image[row + static_cast<size_t>(width - 1 - x)];
+      differ += std::abs(a - b) * 255 <= 8 ? 0 : 1;
+    }
+  }
+  RC_LOG() << differ << " pixels differ";
+  RC_ASSERT(differ <= 2 + image.size() / 1000);
+}
+
+}  // namespace
+}  // namespace dlsd

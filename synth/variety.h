@@ -1,0 +1,77 @@
+#pragma once
+// Variety on demand: ranges from which scenes get more than their preset gives them, and random
+// cameras. Without it presets are what they are.
+
+#include <cstdint>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "cameras/camera.h"
+#include "synth/scene.h"
+
+namespace dlsd {
+
+/// Uniform draws from [lo, hi].
+struct Interval {
+  double lo, hi;
+  bool operator==(const Interval&) const = default;
+};
+
+/// What is drawn for each frame. The defaults change nothing.
+struct SceneVariety {
+  /// Factor on how far the albedos are from their mean, within [0, 3].
+  Interval contrast{1, 1};
+  /// Round things in the open, within [0, 30]: balls, discs, rings and sagging strings of balls.
+  /// They have no straight edges, so no labels.
+  Interval distractors{0, 0};
+  /// Share of the plain rectangular faces that get a print without straight edges (dots, or rings
+  /// like those of wood), within [0, 1].
+  Interval prints{0, 0};
+  /// Share of the frames in which all lights cast shadows, in [0, 1]; -1: as the preset has it.
+  /// Lamps inside a ball never do.
+  double shadows = -1;
+
+  bool operator==(const SceneVariety&) const = default;
+  /// Throws std::invalid_argument naming the field, its value and the allowed range.
+  void check() const;
+};
+
+/// What is drawn for each random camera.
+struct CameraVariety {
+  /// Seen from the left border to the right one, degrees, within [20, 300]; less where the model
+  /// cannot.
+  Interval field_of_view_deg{60, 220};
+  Interval width_px{640, 1280};  ///< Within [64, 8192].
+  Interval aspect{0.5625, 1};    ///< Height over width, within [0.25, 4].
+  Interval principal_offset{0,
+                            0.03};  ///< From the image's centre, over the width, within [0, 0.3].
+  /// 0: the model's nearest to a plain projection (kannala_brandt: equidistant); 1: as far from it
+  /// as real lenses are.
+  Interval distortion{0, 1};
+
+  bool operator==(const CameraVariety&) const = default;
+  void check() const;
+};
+
+[[nodiscard]] nlohmann::ordered_json toJson(const SceneVariety& variety);
+[[nodiscard]] nlohmann::ordered_json toJson(const CameraVariety& variety);
+
+/// A configuration file: {"scene": {"contrast": [lo, hi], ..}, "camera": {..}}; what is left out
+/// keeps its value. Throws InputError naming file and key for unknown keys and values out of range.
+void readVariety(const std::string& path, SceneVariety* scene, CameraVariety* camera);
+
+/// Adds to a frame what the variety draws for it: a function of the arguments.
+void addVariety(const SceneVariety& variety, uint64_t seed, uint64_t index, SceneView* view);
+
+/// Names that drawCamera knows: "pinhole", "fov", "kb", "omni", "eucm", "ds".
+[[nodiscard]] const std::vector<std::string>& randomCameraModels();
+
+/// Random camera number `index` of a model. Throws std::invalid_argument for an unknown name.
+[[nodiscard]] Camera drawCamera(std::string_view model,
+                                const CameraVariety& variety,
+                                uint64_t seed,
+                                uint64_t index);
+
+}  // namespace dlsd
