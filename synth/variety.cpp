@@ -26,7 +26,7 @@ using nlohmann::ordered_json;
 
 constexpr uint64_t kSceneStream = 0x7a51, kCameraStream = 0x7a5c;
 
-void requireInterval(const char* name, const Interval& value, double lo, double hi) {
+void requireRange(const char* name, const VarietyRange& value, double lo, double hi) {
   if (value.lo >= lo && value.lo <= value.hi && value.hi <= hi) return;
   std::ostringstream message;
   message << name << " = [" << value.lo << ", " << value.hi
@@ -35,7 +35,7 @@ void requireInterval(const char* name, const Interval& value, double lo, double 
   throw std::invalid_argument(message.str());
 }
 
-double draw(Random* random, const Interval& interval) {
+double draw(Random* random, const VarietyRange& interval) {
   return random->next(interval.lo, interval.hi);
 }
 
@@ -223,16 +223,16 @@ class Decorator {
   Vector3d eye_;
 };
 
-const std::vector<std::pair<const char*, Interval SceneVariety::*>>& sceneFields() {
-  static const std::vector<std::pair<const char*, Interval SceneVariety::*>> fields{
+const std::vector<std::pair<const char*, VarietyRange SceneVariety::*>>& sceneFields() {
+  static const std::vector<std::pair<const char*, VarietyRange SceneVariety::*>> fields{
       {"contrast", &SceneVariety::contrast},
       {"distractors", &SceneVariety::distractors},
       {"prints", &SceneVariety::prints}};
   return fields;
 }
 
-const std::vector<std::pair<const char*, Interval CameraVariety::*>>& cameraFields() {
-  static const std::vector<std::pair<const char*, Interval CameraVariety::*>> fields{
+const std::vector<std::pair<const char*, VarietyRange CameraVariety::*>>& cameraFields() {
+  static const std::vector<std::pair<const char*, VarietyRange CameraVariety::*>> fields{
       {"field_of_view_deg", &CameraVariety::field_of_view_deg},
       {"width_px", &CameraVariety::width_px},
       {"aspect", &CameraVariety::aspect},
@@ -262,20 +262,20 @@ void readIntervals(const JsonField& json,
 }  // namespace
 
 void SceneVariety::check() const {
-  requireInterval("scene.contrast", contrast, 0, 3);
-  requireInterval("scene.distractors", distractors, 0, 30);
-  requireInterval("scene.prints", prints, 0, 1);
+  requireRange("scene.contrast", contrast, 0, 3);
+  requireRange("scene.distractors", distractors, 0, 30);
+  requireRange("scene.prints", prints, 0, 1);
   if (shadows == -1 || (shadows >= 0 && shadows <= 1)) return;
   throw std::invalid_argument("scene.shadows = " + std::to_string(shadows) +
                               " is out of range: allowed are [0, 1] and -1");
 }
 
 void CameraVariety::check() const {
-  requireInterval("camera.field_of_view_deg", field_of_view_deg, 20, 300);
-  requireInterval("camera.width_px", width_px, 64, 8192);
-  requireInterval("camera.aspect", aspect, 0.25, 4);
-  requireInterval("camera.principal_offset", principal_offset, 0, 0.3);
-  requireInterval("camera.distortion", distortion, 0, 1);
+  requireRange("camera.field_of_view_deg", field_of_view_deg, 20, 300);
+  requireRange("camera.width_px", width_px, 64, 8192);
+  requireRange("camera.aspect", aspect, 0.25, 4);
+  requireRange("camera.principal_offset", principal_offset, 0, 0.3);
+  requireRange("camera.distortion", distortion, 0, 1);
 }
 
 ordered_json toJson(const SceneVariety& variety) {

@@ -14,21 +14,21 @@
 namespace dlsd {
 
 /// Uniform draws from [lo, hi].
-struct Interval {
+struct VarietyRange {
   double lo, hi;
-  bool operator==(const Interval&) const = default;
+  bool operator==(const VarietyRange&) const = default;
 };
 
 /// What is drawn for each frame. The defaults change nothing.
 struct SceneVariety {
   /// Factor on how far the albedos are from their mean, within [0, 3].
-  Interval contrast{1, 1};
+  VarietyRange contrast{1, 1};
   /// Round things in the open, within [0, 30]: balls, discs, rings and sagging strings of balls.
   /// They have no straight edges, so no labels.
-  Interval distractors{0, 0};
+  VarietyRange distractors{0, 0};
   /// Share of the plain rectangular faces that get a print without straight edges (dots, or rings
   /// like those of wood), within [0, 1].
-  Interval prints{0, 0};
+  VarietyRange prints{0, 0};
   /// Share of the frames in which all lights cast shadows, in [0, 1]; -1: as the preset has it.
   /// Lamps inside a ball never do.
   double shadows = -1;
@@ -42,14 +42,14 @@ struct SceneVariety {
 struct CameraVariety {
   /// Seen from the left border to the right one, degrees, within [20, 300]; less where the model
   /// cannot.
-  Interval field_of_view_deg{60, 220};
-  Interval width_px{640, 1280};  ///< Within [64, 8192].
-  Interval aspect{0.5625, 1};    ///< Height over width, within [0.25, 4].
-  Interval principal_offset{0,
-                            0.03};  ///< From the image's centre, over the width, within [0, 0.3].
+  VarietyRange field_of_view_deg{60, 220};
+  VarietyRange width_px{640, 1280};  ///< Within [64, 8192].
+  VarietyRange aspect{0.5625, 1};    ///< Height over width, within [0.25, 4].
+  VarietyRange principal_offset{
+      0, 0.03};  ///< From the image's centre, over the width, within [0, 0.3].
   /// 0: the model's nearest to a plain projection (kannala_brandt: equidistant); 1: as far from it
   /// as real lenses are.
-  Interval distortion{0, 1};
+  VarietyRange distortion{0, 1};
 
   bool operator==(const CameraVariety&) const = default;
   void check() const;

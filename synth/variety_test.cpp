@@ -125,10 +125,10 @@ TEST(VarietyFile, IsReadAndRefused) {
   read(R"({"scene": {"distractors": [1, 4], "shadows": 0.5}, "camera": {"width_px": [320, 400]}})",
        &scene,
        &camera);
-  EXPECT_EQ(scene.distractors, (Interval{1, 4}));
-  EXPECT_EQ(scene.contrast, (Interval{1, 1}));
+  EXPECT_EQ(scene.distractors, (VarietyRange{1, 4}));
+  EXPECT_EQ(scene.contrast, (VarietyRange{1, 1}));
   EXPECT_EQ(scene.shadows, 0.5);
-  EXPECT_EQ(camera.width_px, (Interval{320, 400}));
+  EXPECT_EQ(camera.width_px, (VarietyRange{320, 400}));
   // What it prints, it reads.
   SceneVariety scene_again;
   CameraVariety camera_again;
