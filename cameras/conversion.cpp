@@ -418,9 +418,14 @@ std::optional<Camera> fitCamera(const Camera& source, std::string_view model, do
       const Samples inner = upToAngle(coarse, angle);
       if (inner.size() >= 20) params = Fit(model, source, inner).minimise(params, 20);
     }
-    Fit fit(model, source, coarse);
-    params = fit.minimise(params, 60);
-    candidates.push_back({fit.at(params).cost, params});
+    const auto try_from = [&](const VectorXd& from) {
+      Fit fit(model, source, coarse);
+      const VectorXd there = fit.minimise(from, 60);
+      candidates.push_back({fit.at(there).cost, there});
+    };
+    try_from(params);
+    // Where the model cannot follow, the way outwards may lead astray.
+    if (!whole) try_from(start);
   }
   std::sort(candidates.begin(), candidates.end(), [](const Candidate& a, const Candidate& b) {
     return a.cost < b.cost;
@@ -429,12 +434,16 @@ std::optional<Camera> fitCamera(const Camera& source, std::string_view model, do
 
   Fit fit(model, source, fine);
   Candidate best{std::numeric_limits<double>::infinity(), {}};
-  for (const Candidate& candidate : candidates) {
-    const VectorXd params = fit.minimise(candidate.params, 200);
+  const auto improve_from = [&](const VectorXd& from) {
+    const VectorXd params = fit.minimise(from, 200);
     const Fit::Value value = fit.at(params);
     const bool projects =
         std::any_of(value.weight.begin(), value.weight.end(), [](double w) { return w > 0; });
     if (projects && value.cost < best.cost) best = {value.cost, params};
+  };
+  for (const Candidate& candidate : candidates) improve_from(candidate.params);
+  for (const auto& [start, whole] : starts.all()) {
+    if (fit.at(start).cost < best.cost) improve_from(start);
   }
   if (best.params.size() == 0) return std::nullopt;
   return makeCamera(

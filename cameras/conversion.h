@@ -38,9 +38,10 @@ struct Conversion {
 
 /// Fits the model `model_name` to the source: least squares, over a grid of pixels of the image, of
 /// the distance between the pixel and the projection of its ray (Levenberg-Marquardt within the
-/// admissible range of the parameters, from several starts, from the axis outwards). Only rays with
-/// a field angle up to max_field_angle_rad count. Distances that are not small against the image's
-/// diagonal D count less, d^2 / (1 + d^2 / D^2), and a ray that the model does not project D^2.
+/// admissible range of the parameters, from several starts, from the axis outwards and at once;
+/// never worse than any of the starts). Only rays with a field angle up to max_field_angle_rad
+/// count. Distances that are not small against the image's diagonal D count less, d^2 / (1 + d^2 /
+/// D^2), and a ray that the model does not project D^2.
 ///
 /// Where the model can express the source exactly, so it does to rounding (<= 1e-9 px); the
 /// source's own model is returned as it is. The result has the size of the source and looks no

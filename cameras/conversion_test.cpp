@@ -167,6 +167,64 @@ TEST(Conversion, IsALeastSquaresFit) {
   }
 }
 
+/// The mean of the fit's cost over all pixels of the image.
+double meanCost(const Camera& source, const Camera& other, double max_angle) {
+  const double square_diagonal = std::pow(source.width(), 2) + std::pow(source.height(), 2);
+  double sum = 0;
+  size_t count = 0;
+  for (int v = 0; v < source.height(); v += 2) {
+    for (int u = 0; u < source.width(); u += 2) {
+      const auto ray = source.unproject({double(u), double(v)});
+      if (!ray || std::atan2(std::hypot(ray->x(), ray->y()), ray->z()) > max_angle) continue;
+      ++count;
+      const auto pixel = other.project(*ray);
+      const double square =
+          pixel ? (*pixel - Eigen::Vector2d(u, v)).squaredNorm() : square_diagonal * 1e12;
+      sum += square / (1 + square / square_diagonal);
+    }
+  }
+  EXPECT_GT(count, 100U);
+  return sum / double(count);
+}
+
+// Whatever the source, also where the model cannot follow it: never worse than the plain camera
+// that agrees with it at the axis, from which the fit sets out.
+TEST(Conversion, IsNoWorseThanTheStart) {
+  const double w = 480, h = 240;
+  const Camera panorama = makeCamera(
+      "equirectangular", std::vector{w / (2 * M_PI), h / M_PI, (w - 1) / 2, (h - 1) / 2}, 480, 240);
+  const Camera wide =
+      makeCamera("fov", std::vector{139.66, 139.71, 197.256, 159.687, 0.933271}, 400, 320);
+  const Camera around =
+      makeCamera("omni", std::vector{1.4, 184.5, 184.25, 201.3, 158.9}, 400, 320, 105 * kDegree);
+  int compared = 0;
+  for (const Camera& source : {panorama, wide, around}) {
+    const ProjectionJacobian axis = *source.jacobian(Eigen::Vector3d::UnitZ());
+    const Eigen::Vector2d centre = *source.project(Eigen::Vector3d::UnitZ());
+    const std::vector<double> plain{axis(0, 0), axis(1, 1), centre.x(), centre.y()};
+    std::vector<double> equidistant = plain, flat = plain;
+    equidistant.resize(8, 0);
+    flat.resize(9, 0);
+    for (const double max_angle : {40.0, 60.0, 80.0, 100.0, 180.0}) {
+      for (const auto& [model, params] :
+           {std::pair<const char*, std::vector<double>>{"kannala_brandt", equidistant},
+            {"pinhole_radtan", flat},
+            {"pinhole", plain}}) {
+        SCOPED_TRACE(std::string(source.modelName()) + " to " + model + " up to " +
+                     std::to_string(max_angle));
+        const auto conversion = convertCamera(source, model, max_angle * kDegree);
+        ASSERT_TRUE(conversion);
+        const Camera start = makeCamera(model, params, source.width(), source.height());
+        // The fit looks at a grid of pixels.
+        EXPECT_LE(meanCost(source, conversion->camera, max_angle * kDegree),
+                  1.02 * meanCost(source, start, max_angle * kDegree) + 1e-12);
+        ++compared;
+      }
+    }
+  }
+  EXPECT_EQ(compared, 45);
+}
+
 TEST(Conversion, TheResultLooksNoFartherThanTheSource) {
   const auto mirror_as_kb = convertCamera(mirror(), "kannala_brandt");
   ASSERT_TRUE(mirror_as_kb);

@@ -43,6 +43,15 @@ void check(const ViewRequest& request, int min_size) {
   }
 }
 
+constexpr double kSeamPx = 0.05;  ///< How far an image may miss the seam and still go around.
+
+/// Whether the top and bottom borders of a panorama's image are the poles.
+bool reachesPoles(const Camera& camera) {
+  const auto* const sphere = std::get_if<Equirectangular>(&camera.model());
+  return sphere != nullptr && std::abs(M_PI * sphere->fy - camera.height()) <= kSeamPx &&
+         std::abs(sphere->cy - (camera.height() - 1) / 2.0) <= kSeamPx;
+}
+
 /// Unit ray in the view's frame.
 std::optional<Vector3d> rayOfPlane(ViewKind kind, double s, double t) {
   if (kind == ViewKind::kPinhole) return Vector3d(s, t, 1).normalized();
@@ -56,7 +65,11 @@ std::optional<Vector3d> rayOfPlane(ViewKind kind, double s, double t) {
 class Source {
  public:
   explicit Source(const Camera& camera)
-      : camera_(camera), width_(size_t(camera.width())), height_(size_t(camera.height())) {
+      : camera_(camera),
+        width_(size_t(camera.width())),
+        height_(size_t(camera.height())),
+        around_(goesAround(camera)),
+        has_poles_(around_ && reachesPoles(camera)) {
     std::vector<double> u(width_), v(width_), x(width_), y(width_), z(width_);
     for (size_t i = 0; i < width_; ++i) u[i] = double(i);
     has_ray_.resize(width_ * height_);
@@ -69,24 +82,45 @@ class Source {
 
   [[nodiscard]] const Camera& camera() const { return camera_; }
 
-  /// Whether the pixels around are in the image and have rays.
-  [[nodiscard]] bool shows(double u, double v) const {
-    if (!(u >= 0 && v >= 0 && u <= double(width_ - 1) && v <= double(height_ - 1))) return false;
-    const auto x = size_t(u), y = size_t(v);
-    const size_t right = u > double(x) ? 1 : 0, below = v > double(y) ? width_ : 0;
-    const uint8_t* at = &has_ray_[y * width_ + x];
-    return (at[0] & at[right] & at[below] & at[right + below]) != 0;
+  /// Where to interpolate for a projected ray: there, or within half a pixel of a pole in the row
+  /// next to it. No value unless the pixels around, across the seam too, are in the image and have
+  /// rays.
+  [[nodiscard]] std::optional<Vector2d> shown(double u, double v) const {
+    const auto last_column = double(width_ - 1), last_row = double(height_ - 1);
+    const double beyond = around_ ? 0.5 + kSeamPx : 0;
+    if (has_poles_ && v >= -0.5 - kSeamPx && v <= last_row + 0.5 + kSeamPx) {
+      v = std::clamp(v, 0.0, last_row);
+    }
+    if (!(u >= -beyond && v >= 0 && u <= last_column + beyond && v <= last_row)) {
+      return std::nullopt;
+    }
+    const double left = std::floor(u);
+    const auto y = size_t(v);
+    const size_t x0 = left < 0 ? width_ - 1 : size_t(left);
+    const size_t x1 = u > left ? (x0 + 1) % width_ : x0;
+    const uint8_t* row = &has_ray_[y * width_];
+    const uint8_t* below = v > double(y) ? row + width_ : row;
+    if ((row[x0] & row[x1] & below[x0] & below[x1]) == 0) return std::nullopt;
+    return Vector2d(u, v);
   }
 
   /// The pixel of a ray that may be interpolated.
   [[nodiscard]] std::optional<Vector2d> pixelOf(const Vector3d& ray_in_cam) const {
     const std::optional<Vector2d> pixel = camera_.project(ray_in_cam);
-    return pixel && shows(pixel->x(), pixel->y()) ? pixel : std::nullopt;
+    return pixel ? shown(pixel->x(), pixel->y()) : std::nullopt;
+  }
+
+  /// From one pixel to another, across the seam where that is the shorter way.
+  [[nodiscard]] Vector2d step(const Vector2d& from, const Vector2d& to) const {
+    Vector2d d = to - from;
+    if (around_) d.x() -= double(width_) * std::round(d.x() / double(width_));
+    return d;
   }
 
  private:
   const Camera& camera_;
   size_t width_, height_;
+  bool around_, has_poles_;
   std::vector<uint8_t> has_ray_;
 };
 
@@ -111,10 +145,11 @@ ViewMaps mapsOf(const Source& source, const VirtualView& view) {
     }
     projectAll(source.camera(), x, y, z, u, v, valid);
     for (size_t i = 0; i < width; ++i) {
-      if (valid[i] == 0 || !source.shows(u[i], v[i])) continue;
+      const std::optional<Vector2d> pixel = valid[i] != 0 ? source.shown(u[i], v[i]) : std::nullopt;
+      if (!pixel) continue;
       const size_t at = row * width + i;
-      maps.u[at] = float(u[i]);
-      maps.v[at] = float(v[i]);
+      maps.u[at] = float(pixel->x());
+      maps.v[at] = float(pixel->y());
       maps.valid[at] = 1;
     }
   }
@@ -209,8 +244,8 @@ class CropSearch {
       for (int column = 0; column < kCells; ++column) {
         double area = 0;
         if (inside(column)) {
-          const Vector2d p = *node(row + 1, column + 1) - *node(row, column);
-          const Vector2d q = *node(row + 1, column) - *node(row, column + 1);
+          const Vector2d p = source_.step(*node(row, column), *node(row + 1, column + 1));
+          const Vector2d q = source_.step(*node(row, column + 1), *node(row + 1, column));
           area = std::abs(p.x() * q.y() - p.y() * q.x()) / 2;
         }
         sum(row + 1, column + 1) =
@@ -291,6 +326,12 @@ class CropSearch {
 
 }  // namespace
 
+bool goesAround(const Camera& camera) {
+  const auto* const sphere = std::get_if<Equirectangular>(&camera.model());
+  return sphere != nullptr && std::abs(2 * M_PI * sphere->fx - camera.width()) <= kSeamPx &&
+         std::abs(sphere->cx - (camera.width() - 1) / 2.0) <= kSeamPx;
+}
+
 std::optional<Vector3d> VirtualView::rayInCam(const Vector2d& pixel) const {
   const std::optional<Vector3d> ray =
       rayOfPlane(kind, (pixel.x() - cx) / fx, (pixel.y() - cy) / fy);
@@ -318,8 +359,11 @@ std::optional<Vector2d> VirtualView::pixelOf(const Vector3d& ray_in_cam) const {
 }
 
 std::optional<Camera> VirtualView::camera() const {
-  if (kind != ViewKind::kPinhole) return std::nullopt;
-  return makeCamera("pinhole", std::array{fx, fy, cx, cy}, width, height);
+  if (kind == ViewKind::kCylindrical) return std::nullopt;
+  return makeCamera(kind == ViewKind::kPinhole ? Pinhole::kName : Equirectangular::kName,
+                    std::array{fx, fy, cx, cy},
+                    width,
+                    height);
 }
 
 VirtualView centredView(const ViewRequest& request) {

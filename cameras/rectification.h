@@ -33,7 +33,7 @@ struct VirtualView {
   /// and beyond +-1e9 px.
   [[nodiscard]] std::optional<Eigen::Vector2d> pixelOf(const Eigen::Vector3d& ray_in_cam) const;
   /// The view as a camera in its own frame (turned by cam_from_view^T against the real one). No
-  /// value for a kind that is no camera model.
+  /// value for a cylindrical one, which is no camera model of ours.
   [[nodiscard]] std::optional<Camera> camera() const;
 };
 
@@ -70,7 +70,13 @@ struct Crop {
 /// Throws std::invalid_argument as centredView, but fov_rad may be missing.
 [[nodiscard]] Crop cropView(const Camera& source, const ViewRequest& request);
 
-/// For each pixel of the view, row by row, where to look in the source's image.
+/// Whether the source is a panorama whose left and right borders are the seam (within 0.05 px):
+/// what lies between its last column and its first is interpolated from both, and within half a
+/// pixel of a pole the row next to it is shown.
+[[nodiscard]] bool goesAround(const Camera& source);
+
+/// For each pixel of the view, row by row, where to look in the source's image. If that goesAround,
+/// u may be up to half a pixel beyond the first or last column.
 struct ViewMaps {
   int width = 0, height = 0;
   std::vector<float> u, v;     ///< Source pixel, rounded to float: by at most 1/65536 px below 512.

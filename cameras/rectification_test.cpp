@@ -224,6 +224,102 @@ TEST(ViewMaps, StraightLinesBecomeStraight) {
   EXPECT_GT(most_bent, 10);
 }
 
+Camera sphere(int width) {
+  const double w = width, h = width / 2;
+  return makeCamera("equirectangular",
+                    std::vector{w / (2 * M_PI), h / M_PI, (w - 1) / 2, (h - 1) / 2},
+                    width,
+                    width / 2);
+}
+
+TEST(ViewMaps, GoAroundAPanorama) {
+  const Camera source = sphere(400);
+  EXPECT_TRUE(goesAround(source));
+  for (const ViewKind kind : kKinds) {
+    for (const Vector3d& axis : {Vector3d(0, 1, 0), Vector3d(1, 0, 0), Vector3d(0, 0, 1)}) {
+      ViewRequest r = request(kind, 300, 200, kind == ViewKind::kPinhole ? 100 : 360);
+      r.cam_from_view = Eigen::AngleAxisd(axis.z() > 0 ? 0.4 : M_PI - 1e-3, axis).matrix();
+      const VirtualView view = centredView(r);
+      const ViewMaps maps = viewMaps(source, view);
+      int shown = 0, across = 0;
+      for (int y = 0; y < 200; ++y) {
+        for (int x = 0; x < 300; ++x) {
+          const size_t i = size_t(y) * 300 + size_t(x);
+          const auto ray = view.rayInCam({double(x), double(y)});
+          ASSERT_EQ(maps.valid[i] != 0, ray.has_value()) << x << " " << y;
+          if (!ray) continue;
+          ++shown;
+          across += maps.u[i] < 0 || maps.u[i] > 399 ? 1 : 0;
+          const Vector2d expected = *source.project(*ray);
+          EXPECT_NEAR(maps.u[i], expected.x(), 1e-4);
+          EXPECT_NEAR(maps.v[i], std::clamp(expected.y(), 0.0, 199.0), 1e-4);
+        }
+      }
+      EXPECT_GT(shown, 10000);
+      if (kind != ViewKind::kPinhole || axis.z() == 0) {
+        EXPECT_GT(across, 0);
+      }
+    }
+  }
+}
+
+TEST(ViewMaps, GoAroundNothingElse) {
+  EXPECT_FALSE(goesAround(tumVi()));
+  const double fx = 400 / (2 * M_PI);
+  for (const auto& [params, width] : std::vector<std::pair<std::vector<double>, int>>{
+           {{fx * 1.01, fx, 199.5, 99.5}, 400},  // less than the circle
+           {{fx * 0.99, fx, 199.5, 99.5}, 400},  // more than the image has
+           {{fx, fx, 150.0, 99.5}, 400},         // the seam is inside
+           {{fx, fx, 199.5, 99.5}, 300}}) {      // a part of the circle
+    const Camera source = makeCamera("equirectangular", params, width, 200);
+    EXPECT_FALSE(goesAround(source));
+    // Backwards, the seam shows.
+    ViewRequest r = request(ViewKind::kPinhole, 300, 200, 90);
+    r.cam_from_view = Eigen::AngleAxisd(M_PI, Vector3d::UnitY()).matrix();
+    const ViewMaps maps = viewMaps(source, centredView(r));
+    EXPECT_GT(std::count(maps.valid.begin(), maps.valid.end(), 0), 0);
+  }
+}
+
+TEST(Crop, TakesAllOfAPanoramaWhateverTheAxis) {
+  const Camera source = sphere(400);
+  for (const Eigen::Matrix3d& turn :
+       {Eigen::Matrix3d(Eigen::Matrix3d::Identity()),
+        Eigen::AngleAxisd(M_PI, Vector3d::UnitY()).toRotationMatrix(),
+        Eigen::AngleAxisd(M_PI / 2, Vector3d::UnitX()).toRotationMatrix(),
+        someRotation()}) {
+    ViewRequest r = request(ViewKind::kEquirectangular, 360, 180, std::nullopt);
+    r.cam_from_view = turn;
+    const Crop crop = cropView(source, r);
+    ASSERT_TRUE(crop.view);
+    EXPECT_TRUE(crop.cut_by_fov);
+    // 360 x 180 degrees between the outermost pixels.
+    EXPECT_NEAR(359 / crop.view->fx, 2 * M_PI, 2e-3);
+    EXPECT_NEAR(179 / crop.view->fy, M_PI, 1e-3);
+    ViewRequest flat = request(ViewKind::kPinhole, 360, 180, 100);
+    flat.cam_from_view = turn;
+    const Crop pinhole_crop = cropView(source, flat);
+    ASSERT_TRUE(pinhole_crop.view);
+    EXPECT_NEAR(359 / pinhole_crop.view->fx, 2 * std::tan(50 * kDegree), 1e-6);
+  }
+}
+
+// The view is what its camera says.
+TEST(VirtualView, IsACamera) {
+  for (const ViewKind kind : kKinds) {
+    const VirtualView view = centredView(request(kind, 300, 200, 120));
+    const std::optional<Camera> camera = view.camera();
+    ASSERT_EQ(camera.has_value(), kind != ViewKind::kCylindrical);
+    if (!camera) continue;
+    EXPECT_EQ(camera->width(), 300);
+    EXPECT_EQ(camera->height(), 200);
+    for (const Vector3d& ray :
+         {Vector3d(0.3, 0.2, 1), Vector3d(-0.7, -0.4, 0.6), Vector3d(0.1, -0.9, 0.4)}) {
+      EXPECT_LE((*camera->project(ray) - *view.pixelOf(ray)).norm(), 1e-10);
+    }
+  }
+}
+
 size_t pixelsInside(const Camera& source, const VirtualView& view) {
   size_t count = 0;
   for (int y = 0; y < source.height(); ++y) {

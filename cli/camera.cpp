@@ -35,22 +35,26 @@ constexpr Entry kCommands[] = {
 
 }  // namespace
 
+void addCalibrationFormat(CLI::App& command, std::string* format) {
+  std::vector<std::string> names;
+  for (const CalibrationFormat& f : calibrationFormats()) {
+    names.emplace_back(f.name);
+  }
+  command
+      .add_option("--format",
+                  *format,
+                  fmt::format("Format of the calibration file, if its content does not tell: {}",
+                              fmt::join(names, ", ")))
+      ->type_name("NAME")
+      ->check(CLI::IsMember(names));
+}
+
 void addCameraArgument(CLI::App& command, CameraArgument* argument) {
   command
       .add_option("file", argument->path, "Calibration file, or file:camera if it holds several")
       ->type_name("FILE")
       ->required();
-  std::vector<std::string> names;
-  for (const CalibrationFormat& format : calibrationFormats()) {
-    names.emplace_back(format.name);
-  }
-  command
-      .add_option("--format",
-                  argument->format,
-                  fmt::format("The file's format, if its content does not tell: {}",
-                              fmt::join(names, ", ")))
-      ->type_name("NAME")
-      ->check(CLI::IsMember(names));
+  addCalibrationFormat(command, &argument->format);
 }
 
 LoadedCalibration loadChosen(const CameraArgument& argument) {
@@ -122,7 +126,7 @@ Run addCamera(CLI::App& command) {
       "  dlsd camera show wide.yaml --plot wide.png\n"
       "  dlsd camera check wide.yaml --image photo.png\n"
       "  dlsd camera convert wide.yaml --to kannala_brandt --out wide_kb.yaml\n"
-      "  dlsd camera rectify wide.yaml photo.png --crop --out rectified\n"
+      "  dlsd camera rectify wide.yaml photo.png --crop --fov 120 --out rectified\n"
       "dlsd camera COMMAND --help shows more.");
   return [commands, names]() -> int {
     for (const auto& [sub, run] : commands) {

@@ -94,8 +94,14 @@ RoundTrip roundTrip(const Camera& camera) {
   return result;
 }
 
-/// The first place, walking outwards from the image of the axis, where the field angle does not
-/// rise.
+/// Whether the image is a radial curve about the image of the axis, but for a little tangential
+/// distortion. A panorama's meridians are no such curves.
+bool isRadial(const Camera& camera) {
+  return !std::holds_alternative<Equirectangular>(camera.model());
+}
+
+/// The first place, walking outwards from the image of the axis, where the field angle of a radial
+/// camera does not rise.
 struct Turn {
   Vector2d at_px{0, 0};
   double angle_rad = 0;
@@ -195,6 +201,13 @@ std::string textOf(const Straightness& s) {
       break;
     case Straightness::Verdict::kUndecided:
       text += "no verdict, these lines do not tell; " + bulge;
+      if (s.only_beyond_rad) {
+        text += fmt::format(
+            "; only those beyond {:.0f} deg are bowed: if the lens ends there, a max_field_angle "
+            "in "
+            "the calibration says so",
+            *s.only_beyond_rad * kDegreesPerRad);
+      }
       break;
   }
   text += "\n";
@@ -221,6 +234,14 @@ int run(const Arguments& arguments) {
                                    camera.width(),
                                    camera.height()));
     }
+    for (size_t i = 0; i + 1 < images.size(); ++i) {
+      if (images[i].bytes == images.back().bytes) {
+        throw InputError(
+            fmt::format("--image {}: is the same picture as {}, which would count twice",
+                        path,
+                        arguments.images[i]));
+      }
+    }
   }
 
   std::string text;
@@ -234,7 +255,8 @@ int run(const Arguments& arguments) {
       text += fmt::format("{:<22}  {}\n", name, value);
     };
     const RoundTrip trip = roundTrip(camera);
-    const std::optional<Turn> turn = firstTurn(camera);
+    const bool radial = isRadial(camera);
+    const std::optional<Turn> turn = radial ? firstTurn(camera) : std::nullopt;
     const auto place = [](const Worst& worst) {
       return fmt::format("({}, {})", worst.at_px.x(), worst.at_px.y());
     };
@@ -254,11 +276,12 @@ int run(const Arguments& arguments) {
                     100 * double(trip.pixels - trip.with_ray) / double(trip.pixels)));
     row("rays that do not return", fmt::format("{}/{}", trip.broken, trip.with_ray));
     row("radial curve",
-        turn ? fmt::format("does not rise at ({:.1f}, {:.1f}), {:.2f} deg",
+        turn      ? fmt::format("does not rise at ({:.1f}, {:.1f}), {:.2f} deg",
                            turn->at_px.x(),
                            turn->at_px.y(),
                            turn->angle_rad * kDegreesPerRad)
-             : "the field angle rises from the principal point to the border or rim");
+        : !radial ? "none: a panorama is not radial; the determinant below tells of folds"
+                  : "the field angle rises from the principal point to the border or rim");
     row("Jacobian",
         fmt::format("determinant not positive at {}/{} pixels; {:.3f} ... {:.3f} px/deg",
                     trip.folded,

@@ -14,6 +14,9 @@ Run addCameraCheck(CLI::App& command);
 Run addCameraConvert(CLI::App& command);
 Run addCameraRectify(CLI::App& command);
 
+/// Adds --format, by which calibration files are read; empty: by their content.
+void addCalibrationFormat(CLI::App& command, std::string* format);
+
 /// What the user names by FILE or FILE:camera and --format.
 struct CameraArgument {
   std::string path, format;

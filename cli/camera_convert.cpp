@@ -21,7 +21,42 @@ struct Arguments {
   std::optional<double> max_px;
 };
 
-std::string textOf(const Conversion& conversion) {
+constexpr double kWorthAWordPx = 1;  // a residual that the user is told of
+
+/// Without the limit of the field angle that the conversion added, if the format says the camera
+/// only so.
+Camera withoutUnsayableLimit(const Camera& source, const Camera& camera, std::string_view format) {
+  if (camera.maxFieldAngleLimit() == source.maxFieldAngleLimit()) {
+    return camera;
+  }
+  const auto says = [&](const Camera& c) {
+    try {
+      (void)calibrationText({{"cam0", c}}, format);
+      return true;
+    } catch (const std::invalid_argument&) {
+      return false;
+    }
+  };
+  const Camera unlimited(camera.model(), camera.width(), camera.height());
+  return !says(camera) && says(unlimited) ? unlimited : camera;
+}
+
+/// As Kalibr wants them, cam0, cam1, ...; what was renamed is said.
+std::string renumber(std::vector<NamedCamera>* cameras) {
+  std::string text;
+  for (size_t i = 0; i < cameras->size(); ++i) {
+    const std::string name = fmt::format("cam{}", i);
+    std::string& before = (*cameras)[i].name;
+    if (before != name) {
+      text += fmt::format("{}{} is {}", text.empty() ? "in the file " : ", ", before, name);
+      before = name;
+    }
+  }
+  return text.empty() ? text : text + "\n";
+}
+
+/// @param note  Lines to stand below the parameters.
+std::string textOf(const Conversion& conversion, const std::string& note) {
   const Camera& camera = conversion.camera;
   std::string text = fmt::format("{:<14}  {}\n", "model", camera.modelName());
   const std::vector<double> params = camera.params();
@@ -38,6 +73,7 @@ std::string textOf(const Conversion& conversion) {
                         "limit",
                         camera.maxFieldAngleLimit() * kDegreesPerRad);
   }
+  text += note;
   text += "\nfield angle      pixels      rms px      max px   not projected\n";
   const auto row = [](const std::string& name, const ResidualBand& band) {
     return fmt::format("{:<14}  {:>7}  {:>10.3g}  {:>10.3g}  {:>14}\n",
@@ -83,7 +119,7 @@ int run(const Arguments& arguments) {
   }
   const double max_angle = std::min(M_PI, arguments.max_angle_deg / kDegreesPerRad);
   std::string text;
-  std::vector<std::string> complaints;
+  std::vector<std::string> complaints, warnings;
   std::vector<NamedCamera> converted;
   for (const NamedCamera& named : calibration.cameras) {
     const std::string model =
@@ -100,8 +136,28 @@ int run(const Arguments& arguments) {
     if (calibration.cameras.size() > 1) {
       text += fmt::format("{}== {} ==\n", text.empty() ? "" : "\n", named.name);
     }
-    text += fmt::format("{:<14}  {}\n", "from", named.camera.modelName()) + textOf(*conversion);
+    Camera written = conversion->camera;
+    std::string note;
+    if (!arguments.out.empty()) {
+      written = withoutUnsayableLimit(named.camera, written, arguments.out_format);
+      if (!(written == conversion->camera)) {
+        note = fmt::format(
+            "{:<14}  is not in the file: {} has no word for it\n", "", arguments.out_format);
+      }
+    }
+    text +=
+        fmt::format("{:<14}  {}\n", "from", named.camera.modelName()) + textOf(*conversion, note);
     const ResidualBand& all = conversion->residual.all;
+    if (!arguments.max_px && (all.lost > 0 || !(all.max_px <= kWorthAWordPx))) {
+      warnings.push_back(fmt::format(
+          "{} ({}): {} does not say this camera: {} of its pixels do not project, the others are "
+          "off by up to {:.3g} px; --max-angle leaves out the rim, --max-px refuses such a result",
+          arguments.camera.path,
+          named.name,
+          model,
+          all.lost,
+          all.max_px));
+    }
     if (arguments.max_px && !(all.max_px <= *arguments.max_px)) {
       complaints.push_back(fmt::format("{} ({}): {} is off by {:.3g} px, more than --max-px {:g}",
                                        arguments.camera.path,
@@ -117,15 +173,18 @@ int run(const Arguments& arguments) {
           model,
           all.lost));
     }
-    converted.push_back({named.name, conversion->camera});
+    converted.push_back({named.name, written});
   }
   if (complaints.empty() && !arguments.out.empty()) {
-    if (converted.size() == 1) {
-      converted.front().name = "cam0";
+    if (converted.size() == 1 || arguments.out_format == "kalibr") {
+      text += renumber(&converted);
     }
     saveCalibration(arguments.out, converted, arguments.out_format);
   }
   print(text);
+  for (const std::string& warning : warnings) {
+    complain(warning);
+  }
   for (const std::string& complaint : complaints) {
     complain(complaint);
   }
@@ -162,7 +221,7 @@ Run addCameraConvert(CLI::App& command) {
   command
       .add_option("--max-px",
                   arguments->max_px,
-                  "Exit with 1 and write nothing if any pixel is off by more")
+                  "Exit with 1 and write nothing if any pixel is off by more or does not project")
       ->type_name("PX");
   command.footer(
       "Examples:\n"

@@ -90,6 +90,18 @@ void drawCurves(cv::Mat& canvas, const cv::Rect& box, const Camera& camera) {
     }
     curves.push_back(curve);
   }
+  // At the poles of a panorama the scale has no bound: what is far beyond most of the curves is
+  // cut.
+  std::vector<double> scales;
+  for (const Curve& curve : curves) {
+    scales.insert(scales.end(), curve.radial.begin(), curve.radial.end());
+    scales.insert(scales.end(), curve.tangential.begin(), curve.tangential.end());
+  }
+  if (!scales.empty()) {
+    const auto most = scales.begin() + long(scales.size() * 9 / 10);
+    std::nth_element(scales.begin(), most, scales.end());
+    max_scale = std::min(max_scale, 3 * *most);
+  }
   max_scale = std::max(max_scale, 1e-9) * 1.08;
   max_angle *= 1.04;
   const auto at = [&](double radius, double value, double max_value) {
@@ -121,7 +133,7 @@ void drawCurves(cv::Mat& canvas, const cv::Rect& box, const Camera& camera) {
                         const cv::Scalar& colour,
                         int thickness) {
     std::vector<cv::Point> points;
-    for (size_t i = 0; i < values.size(); ++i) {
+    for (size_t i = 0; i < values.size() && values[i] <= max_value; ++i) {
       points.push_back(at(curve.radius_px[i], values[i], max_value));
     }
     cv::polylines(canvas, points, false, colour, thickness, cv::LINE_AA, 4);
@@ -200,6 +212,7 @@ void drawRegion(cv::Mat& canvas, const cv::Rect& box, const Camera& camera) {
   cv::drawMarker(canvas, canvasOf(*centre), kRadial, cv::MARKER_CROSS, 14, 1, cv::LINE_AA);
   // Labels where each contour leaves the centre towards the right or, if it is not there, another
   // way.
+  std::vector<cv::Rect> labels;
   for (int degrees = 10; degrees <= int(widest); degrees += 10) {
     for (const double azimuth : {0.0, M_PI, M_PI / 4, -M_PI / 4, 3 * M_PI / 4, -3 * M_PI / 4}) {
       const std::optional<Vector2d> pixel =
@@ -215,9 +228,14 @@ void drawRegion(cv::Mat& canvas, const cv::Rect& box, const Camera& camera) {
                                 extent.width + 4,
                                 extent.height + 4);
       const cv::Rect panel(left, top, w, h);
-      if ((background & panel) != background) {
+      const bool covers_another =
+          std::any_of(labels.begin(), labels.end(), [&](const cv::Rect& label) {
+            return (label & background).area() > 0;
+          });
+      if ((background & panel) != background || covers_another) {
         continue;
       }
+      labels.push_back(background);
       cv::rectangle(canvas, background, kInside, cv::FILLED);
       writeCentred(canvas, label, at, kContour, 0.4);
       break;

@@ -31,6 +31,7 @@ struct Arguments {
 };
 
 constexpr int kMaxSize = 32766;  // OpenCV's remap
+constexpr int kSeamMargin = 2;   // cubic interpolation looks that far
 
 /// Numbers between separators, all of the text.
 template <class T>
@@ -94,7 +95,7 @@ ViewRequest readRequest(const Arguments& arguments, const Camera& camera) {
     }
     if (!(fov > 0 && fov <= 360)) {
       throw InputError(fmt::format(
-          "--fov is {:g}, allowed are degrees in (0, {})", fov, pinhole ? "180)" : "360]"));
+          "--fov is {:g}, allowed are degrees in (0, {}", fov, pinhole ? "180)" : "360]"));
     }
     request.fov_rad = fov / kDegreesPerRad;
   } else if (!arguments.crop) {
@@ -185,7 +186,9 @@ Image maskOf(const ViewMaps& maps) {
 }
 
 /// 8 or 16 bit and channels as in the source; black where the maps have no source.
-Image remapped(const Image& image, const cv::Mat& map, const ViewMaps& maps, int interpolation) {
+/// @param margin  Columns of the image's other side to put on each side first; `map` counts them.
+Image remapped(
+    const Image& image, int margin, const cv::Mat& map, const ViewMaps& maps, int interpolation) {
   Image view;
   view.width = maps.width;
   view.height = maps.height;
@@ -195,8 +198,12 @@ Image remapped(const Image& image, const cv::Mat& map, const ViewMaps& maps, int
   view.bytes.resize(maps.valid.size() * bytes);
   const int type = CV_MAKETYPE(image.bits == 16 ? CV_16U : CV_8U, image.channels);
   // Only read; OpenCV has no const view.
-  const cv::Mat from(
+  cv::Mat from(
       image.height, image.width, type, const_cast<uint8_t*>(image.bytes.data()));  // NOLINT
+  if (margin > 0) {
+    const cv::Mat once = from;
+    cv::copyMakeBorder(once, from, 0, 0, margin, margin, cv::BORDER_WRAP);
+  }
   cv::Mat to(view.height, view.width, type, view.bytes.data());
   cv::remap(from, to, map, cv::noArray(), interpolation, cv::BORDER_REPLICATE);
   for (size_t i = 0; i < maps.valid.size(); ++i) {
@@ -237,9 +244,11 @@ std::string textOf(const VirtualView& view, const std::string& kind, const ViewM
 
 int run(const Arguments& arguments) {
   const Camera camera = loadOne(arguments.camera);
-  if (std::max(camera.width(), camera.height()) > kMaxSize) {
-    throw InputError(fmt::format(
-        "{}: images of more than {} px cannot be rectified", arguments.camera.path, kMaxSize));
+  const int margin = goesAround(camera) ? kSeamMargin : 0;
+  if (std::max(camera.width() + 2 * margin, camera.height()) > kMaxSize) {
+    throw InputError(fmt::format("{}: images of more than {} px cannot be rectified",
+                                 arguments.camera.path,
+                                 kMaxSize - 2 * margin));
   }
   const ViewRequest request = readRequest(arguments, camera);
   if (!arguments.images.empty() && arguments.out.empty()) {
@@ -262,6 +271,13 @@ int run(const Arguments& arguments) {
     }
   }
   checkOutputs(inputs, outputs);
+  // All that may be refused before anything is made.
+  const VirtualView view = makeView(arguments, camera, request);
+  const std::optional<Camera> view_camera =
+      arguments.out_camera.empty() ? std::nullopt : view.camera();
+  if (!arguments.out_camera.empty() && !view_camera) {
+    throw InputError("--out-camera: there is no camera model for a " + arguments.view + " view");
+  }
   if (!arguments.out.empty()) {
     makeFolders(arguments.out);
   }
@@ -269,13 +285,8 @@ int run(const Arguments& arguments) {
     checkPlaceForFile(output);
   }
 
-  const VirtualView view = makeView(arguments, camera, request);
   const ViewMaps maps = viewMaps(camera, view);
-  const std::optional<Camera> view_camera = view.camera();
-  if (!arguments.out_camera.empty()) {
-    if (!view_camera) {
-      throw InputError("--out-camera: there is no camera model for a " + arguments.view + " view");
-    }
+  if (view_camera) {
     saveCameras(arguments.out_camera, {{"cam0", *view_camera}});
   }
   if (!arguments.maps.empty()) {
@@ -291,7 +302,7 @@ int run(const Arguments& arguments) {
     for (int y = 0; y < maps.height; ++y) {
       for (int x = 0; x < maps.width; ++x) {
         const size_t i = size_t(y) * size_t(maps.width) + size_t(x);
-        map.at<cv::Vec2f>(y, x) = {maps.u[i], maps.v[i]};
+        map.at<cv::Vec2f>(y, x) = {maps.u[i] + float(margin), maps.v[i]};
       }
     }
     const int interpolation =
@@ -308,7 +319,7 @@ int run(const Arguments& arguments) {
                                        camera.width(),
                                        camera.height()));
         }
-        writeFileAtomically(views[i], encodePng(remapped(image, map, maps, interpolation)));
+        writeFileAtomically(views[i], encodePng(remapped(image, margin, map, maps, interpolation)));
       } catch (const InputError& error) {
         complaints.emplace_back(error.what());
       }
@@ -362,7 +373,7 @@ Run addCameraRectify(CLI::App& command) {
       .add_option("--maps",
                   arguments->maps,
                   "NumPy file, float32 (height, width, 2): where each pixel of the view is in the "
-                  "image, as cv2.remap takes it")
+                  "image, as cv2.remap takes it (for a panorama of 360 degrees with BORDER_WRAP)")
       ->type_name("FILE.npy");
   command.add_option("--mask", arguments->mask, "PNG file, 255 where the view shows the image")
       ->type_name("FILE.png");
@@ -373,7 +384,8 @@ Run addCameraRectify(CLI::App& command) {
       ->type_name("FILE");
   command.footer(
       "Examples:\n"
-      "  dlsd camera rectify wide.yaml photo.png --crop --out rectified --out-camera rect.yaml\n"
+      "  dlsd camera rectify wide.yaml photo.png --crop --fov 120 --out rectified --out-camera "
+      "rect.yaml\n"
       "  dlsd camera rectify wide.yaml *.png --fov 100 --size 800x600 --rotate 30,0,0 --out right\n"
       "  dlsd camera rectify wide.yaml --view cylindrical --fov 180 --maps maps.npy --mask "
       "mask.png");

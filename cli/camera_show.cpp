@@ -142,7 +142,10 @@ Facts factsOf(const Camera& camera) {
     const Reach end = reach(camera, centre, corner);
     farthest = end.angle_rad > farthest.angle_rad ? end : farthest;
   }
-  if (const std::optional<Vector3d> ray = camera.unproject(farthest.pixel)) {
+  // A corner of a panorama is its pole, where there is no scale: just off it.
+  const Vector2d rim = farthest.pixel + 2 * (centre - farthest.pixel).normalized();
+  const bool pole = std::holds_alternative<Equirectangular>(camera.model());
+  if (const std::optional<Vector3d> ray = camera.unproject(pole ? rim : farthest.pixel)) {
     facts.rim = scaleAt(camera, *ray);
   }
   facts.circle = rimOf(camera, centre);

@@ -3,7 +3,9 @@
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstring>
 #include <opencv2/imgproc.hpp>
 #include <optional>
 
@@ -37,8 +39,72 @@ double quantile(std::vector<double> values, double share) {
   return values[at];
 }
 
+/// The pixel of the image that is nearest.
+cv::Point nearestPixel(const Camera& camera, const Vector2d& pixel) {
+  return {std::clamp(int(std::lround(pixel.x())), 0, camera.width() - 1),
+          std::clamp(int(std::lround(pixel.y())), 0, camera.height() - 1)};
+}
+
+size_t tileOf(const Camera& camera, const Vector2d& pixel) {
+  const cv::Point p = nearestPixel(camera, pixel);
+  return size_t(kTilesPerSide * p.y / camera.height() * kTilesPerSide +
+                kTilesPerSide * p.x / camera.width());
+}
+
+/// 0 (black) to 1, over the channels but alpha.
+double brightness(const Image& image, const cv::Point& pixel) {
+  const auto channels = size_t(image.channels);
+  const size_t colours = std::min<size_t>(channels, 3);
+  const size_t at = (size_t(pixel.y) * size_t(image.width) + size_t(pixel.x)) * channels;
+  double sum = 0;
+  for (size_t c = 0; c < colours; ++c) {
+    if (image.bits == 16) {
+      uint16_t value = 0;
+      std::memcpy(&value, &image.bytes[2 * (at + c)], sizeof value);
+      sum += value / 65535.0;
+    } else {
+      sum += image.bytes[at + c] / 255.0;
+    }
+  }
+  return sum / double(colours);
+}
+
+/// The rim of the image circle is no straight thing: it keeps its field angle (within a degree, as
+/// calibrations have it), and what is outside is black. A straight edge may do the one or the
+/// other.
+bool isImageCircle(const Camera& camera, const Image& image, const DetectedLine& line) {
+  constexpr int kPoints = 9;
+  constexpr double kSpreadRad = 1 * M_PI / 180, kBlack = 0.1;
+  const std::optional<Vector2d> axis = camera.project(Vector3d::UnitZ());
+  if (!axis) {
+    return false;
+  }
+  double smallest = M_PI, largest = 0, outside = 0;
+  int looked_at = 0;
+  for (int i = 0; i < kPoints; ++i) {
+    const Vector3d ray = line.arc.at((i + 0.5) / kPoints);
+    const double angle = fieldAngle(ray);
+    smallest = std::min(smallest, angle);
+    largest = std::max(largest, angle);
+    const std::optional<Vector2d> at = camera.project(ray);
+    if (!at) {
+      continue;
+    }
+    const Vector2d outwards = (*at - *axis).stableNormalized();
+    for (const double px : {4.0, 6.0}) {
+      const Vector2d there = *at + px * outwards;
+      if (camera.inImage(there)) {
+        outside += brightness(image, nearestPixel(camera, there));
+        ++looked_at;
+      }
+    }
+  }
+  return looked_at > 0 && outside / looked_at < kBlack && largest - smallest < 2 * kSpreadRad;
+}
+
 /// What one line's edge says.
 struct LineMeasure {
+  size_t tile = 0;
   double middle_angle_rad = 0, length_px = 0;
   std::vector<double> residual_px, angle_rad;  ///< By point.
   double bulge_px = 0, bulge_sigma_px = 0;     ///< Along the edge's normal, outwards where > 0.
@@ -72,7 +138,9 @@ class EdgeMeter {
     }
     LineMeasure line;
     line.length_px = detected.length_px;
-    line.middle_angle_rad = fieldAngle(detected.arc.at(0.5));
+    const Vector3d middle = detected.arc.at(0.5);
+    line.middle_angle_rad = fieldAngle(middle);
+    line.tile = tileOf(camera_, camera_.project(middle).value_or(*axis_px_));
     for (const Point& p : points) {
       line.angle_rad.push_back(fieldAngle(p.ray));
     }
@@ -260,7 +328,8 @@ class EdgeMeter {
   cv::Mat gx_, gy_;
 };
 
-/// Weighted mean with Huber's weights (iterated), and its standard error from the scatter.
+/// Weighted mean with Huber's weights (iterated), and its standard error from the scatter of lines,
+/// or of tiles if that is larger: lines of one tile, in all the images, may be the same thing.
 Bulge meanBulge(const std::vector<const LineMeasure*>& lines) {
   constexpr double kFloorPx = 0.03;  // real edges are no straighter
   constexpr int kRounds = 20;
@@ -271,6 +340,7 @@ Bulge meanBulge(const std::vector<const LineMeasure*>& lines) {
   std::vector<double> fading(lines.size(), 1), rest(lines.size()), sizes(lines.size());
   for (int round = 0; round < kRounds && !lines.empty(); ++round) {
     double numerator = 0, denominator = 0, spread = 0;
+    std::array<double, kTilesPerSide * kTilesPerSide> of_tile{};
     for (size_t i = 0; i < lines.size(); ++i) {
       const double w = fading[i] / std::pow(sigma(*lines[i]), 2);
       numerator += w * lines[i]->across * lines[i]->bulge_px;
@@ -284,9 +354,15 @@ Bulge meanBulge(const std::vector<const LineMeasure*>& lines) {
       const double s = sigma(*lines[i]);
       rest[i] = (lines[i]->bulge_px - lines[i]->across * bulge.mean_px) / s;
       sizes[i] = std::abs(rest[i]);
-      spread += std::pow(fading[i] * rest[i] * lines[i]->across / s, 2);
+      const double pull = fading[i] * rest[i] * lines[i]->across / s;
+      spread += pull * pull;
+      of_tile.at(lines[i]->tile) += pull;
     }
-    bulge.sigma_px = std::sqrt(spread) / denominator;
+    double spread_of_tiles = 0;
+    for (const double pull : of_tile) {
+      spread_of_tiles += pull * pull;
+    }
+    bulge.sigma_px = std::sqrt(std::max(spread, spread_of_tiles)) / denominator;
     const double bound = 1.345 * std::max(1.0, 1.4826 * quantile(sizes, 0.5));
     for (size_t i = 0; i < lines.size(); ++i) {
       fading[i] = sizes[i] > bound ? bound / sizes[i] : 1;
@@ -322,7 +398,7 @@ StraightnessBand summarise(int index, const std::vector<LineMeasure>& lines) {
   return band;
 }
 
-/// Sums over the points on lines in one tile of one image.
+/// Sums over the points on lines in one tile, of all images.
 struct TileSums {
   double length_px = 0;
   double log_length = 0;  ///< Integral over the points of the log of the length of their line.
@@ -386,7 +462,9 @@ struct StraightnessCheck::Impl {
   explicit Impl(const Camera& c) : camera(c), detector(camera), meter(camera) {}
 
   void prepareTrials(double reference_rad);
-  [[nodiscard]] std::vector<TileSums> tileSums(const std::vector<DetectedLine>& lines) const;
+  void addTileSums(const Image& image,
+                   const std::vector<DetectedLine>& lines,
+                   std::vector<TileSums>* sums) const;
   [[nodiscard]] std::vector<TileSums> detectMoved(double amount_px);
   void runTrials(Straightness* result);
 
@@ -433,12 +511,15 @@ void StraightnessCheck::Impl::prepareTrials(double reference_rad) {
   }
 }
 
-std::vector<TileSums> StraightnessCheck::Impl::tileSums(
-    const std::vector<DetectedLine>& found) const {
+void StraightnessCheck::Impl::addTileSums(const Image& image,
+                                          const std::vector<DetectedLine>& found,
+                                          std::vector<TileSums>* sums) const {
   constexpr double kStepPx = 4;
-  std::vector<TileSums> sums(kTilesPerSide * kTilesPerSide);
   std::vector<size_t> tiles;
   for (const DetectedLine& line : found) {
+    if (isImageCircle(camera, image, line)) {
+      continue;
+    }
     // By points, not by lines, so that what breaks stays in its tiles.
     tiles.clear();
     const int points = std::max(1, int(line.length_px / kStepPx));
@@ -447,22 +528,19 @@ std::vector<TileSums> StraightnessCheck::Impl::tileSums(
       if (!at) {
         continue;
       }
-      const int x = std::clamp(int(std::lround(at->x())), 0, camera.width() - 1);
-      const int y = std::clamp(int(std::lround(at->y())), 0, camera.height() - 1);
-      if (stays[size_t(y) * size_t(camera.width()) + size_t(x)] != 0) {
-        tiles.push_back(size_t(kTilesPerSide * y / camera.height() * kTilesPerSide +
-                               kTilesPerSide * x / camera.width()));
+      const cv::Point p = nearestPixel(camera, *at);
+      if (stays[size_t(p.y) * size_t(camera.width()) + size_t(p.x)] != 0) {
+        tiles.push_back(tileOf(camera, *at));
       }
     }
     const double step = line.length_px / points;
     for (const size_t tile : tiles) {
-      sums[tile] += {step, step * std::log(step * double(tiles.size()))};
+      (*sums)[tile] += {step, step * std::log(step * double(tiles.size()))};
     }
   }
-  return sums;
 }
 
-/// Of all images, one after the other.
+/// By tile.
 std::vector<TileSums> StraightnessCheck::Impl::detectMoved(double amount_px) {
   cv::Mat map = amount_px * displacement;
   for (int y = 0; y < map.rows; ++y) {
@@ -470,13 +548,12 @@ std::vector<TileSums> StraightnessCheck::Impl::detectMoved(double amount_px) {
       map.at<cv::Vec2f>(y, x) += cv::Vec2f(float(x), float(y));
     }
   }
-  std::vector<TileSums> sums;
+  std::vector<TileSums> sums(kTilesPerSide * kTilesPerSide);
   for (const Image& image : images) {
     Image moved = image;
     cv::Mat to(image.height, image.width, matOf(image).type(), moved.bytes.data());
     cv::remap(matOf(image), to, map, cv::noArray(), cv::INTER_CUBIC, cv::BORDER_REPLICATE);
-    const std::vector<TileSums> tiles = tileSums(detector.detect(viewOf(moved)));
-    sums.insert(sums.end(), tiles.begin(), tiles.end());
+    addTileSums(moved, detector.detect(viewOf(moved)), &sums);
   }
   return sums;
 }
@@ -521,6 +598,11 @@ void StraightnessCheck::Impl::runTrials(Straightness* result) {
 
 namespace {
 
+/// Whether the lines inside the outermost band say, beyond chance, what all of them say.
+bool bowedAlike(const Bulge& inner, const Bulge& all) {
+  return inner.mean_px * all.mean_px > 0 && std::abs(inner.mean_px) > 2 * inner.sigma_px;
+}
+
 /// Both witnesses heard.
 Straightness::Verdict verdictOf(const Straightness& s, size_t measured_lines) {
   using Verdict = Straightness::Verdict;
@@ -561,6 +643,9 @@ void StraightnessCheck::add(const Image& image) {
   const std::vector<DetectedLine>& found = impl.detector.detect(viewOf(image));
   impl.meter.setImage(image);
   for (const DetectedLine& line : found) {
+    if (isImageCircle(impl.camera, image, line)) {
+      continue;
+    }
     ++impl.count;
     impl.length_px += line.length_px;
     impl.longest_px = std::max(impl.longest_px, line.length_px);
@@ -589,15 +674,27 @@ Straightness StraightnessCheck::result() {
   for (int i = 0; i * kBandRad <= widest; ++i) {
     result.bands.push_back(summarise(i, impl_->lines));
   }
-  std::vector<const LineMeasure*> off_axis;
+  double outermost = 0;
+  for (const LineMeasure& line : impl_->lines) {
+    outermost = std::max(outermost, kBandRad * std::floor(line.middle_angle_rad / kBandRad));
+  }
+  std::vector<const LineMeasure*> off_axis, inner;
   for (const LineMeasure& line : impl_->lines) {
     if (line.middle_angle_rad > kBandRad) {
       off_axis.push_back(&line);
+      if (line.middle_angle_rad < outermost) {
+        inner.push_back(&line);
+      }
     }
   }
   result.bulge = meanBulge(off_axis);
   impl_->runTrials(&result);
   result.verdict = verdictOf(result, off_axis.size());
+  if (result.verdict == Straightness::Verdict::kOff &&
+      !bowedAlike(meanBulge(inner), result.bulge)) {
+    result.verdict = Straightness::Verdict::kUndecided;
+    result.only_beyond_rad = outermost;
+  }
   return result;
 }
 

@@ -38,7 +38,7 @@ struct StraightnessTrial {
   /// part of the image that is seen in every trial counts.
   double mean_length_px = 0;
   /// Log of mean_length_px over that of the calibration as it is, and its standard error (from
-  /// leaving out one sixteenth of an image after the other).
+  /// leaving out one sixteenth of the images' area after the other).
   double gain = 0, gain_sigma = 0;
 };
 
@@ -54,6 +54,9 @@ struct Straightness {
   double reference_rad = 0;             ///< Field angle that 95 % of the lines' points are within.
   std::vector<StraightnessTrial> trials;  ///< By radius_px; the one with 0 is the calibration's.
   Verdict verdict = Verdict::kUndecided;
+  /// Set where lines would say that the calibration is off, but only those beyond this angle, the
+  /// outermost band: there the image circle or the end of a lens looks like bowed edges.
+  std::optional<double> only_beyond_rad;
   Bulge bulge;         ///< Of all lines more than 10 degrees from the axis.
   double best_px = 0;  ///< radius_px that makes lines longer beyond doubt, most; else 0.
   /// Changes that make lines shorter beyond doubt, the nearest to 0 on either side.
@@ -65,7 +68,8 @@ struct Straightness {
 /// pieces, all to the same side; and how much longer or shorter lines get when the radial curve is
 /// changed, which does not mind curved things, trees and noise, the same in every trial. What
 /// straight lines cannot show (the focal length of a pinhole) neither shows, and the principal
-/// point is not looked at.
+/// point is not looked at. The rim of the image circle, an edge of constant field angle with black
+/// outside, is left out.
 class StraightnessCheck {
  public:
   explicit StraightnessCheck(const Camera& camera);

@@ -134,6 +134,40 @@ TEST_F(CameraCli, ShowPlots) {
   expectRefused("camera show rig.yaml:cam0 --plot nowhere/plot.png", 2, "nowhere");
 }
 
+// At its poles a panorama has no scale.
+TEST_F(CameraCli, ShowTellsOfPanoramasOffTheirPoles) {
+  write("sphere.yaml", "model: equirectangular\nresolution: [160, 80]\n");
+  const Result result = dlsd("camera show sphere.yaml --json");
+  ASSERT_EQ(result.code, 0) << result.err;
+  const auto rim = nlohmann::json::parse(result.out).at("cameras").at(0).at("scale_at_rim");
+  EXPECT_GT(rim.at("tangential_px_per_deg"), 1);
+  EXPECT_LT(rim.at("tangential_px_per_deg"), 160);
+  EXPECT_LT(rim.at("radial_px_per_deg"), 160);
+  EXPECT_EQ(dlsd("camera show sphere.yaml --plot sphere.png").code, 0);
+}
+
+// cv::fisheye or the pinhole model, the file does not say.
+TEST_F(CameraCli, EveryCommandTakesTheFormat) {
+  write(
+      "four.yml",
+      "%YAML:1.0\n---\nimage_width: 160\nimage_height: 120\ncamera_matrix: !!opencv-matrix\n  "
+      "rows: 3\n  cols: 3\n  dt: d\n  data: [56., 0., 79.5, 0., 56., 59.5, 0., 0., 1.]\n"
+      "distortion_coefficients: !!opencv-matrix\n  rows: 1\n  cols: 4\n  dt: d\n  data: [0.01, 0., "
+      "0., 0.]\n");
+  writeImage("a.pgm", 1, 8);
+  for (const std::string command : {"camera show four.yml",
+                                    "camera check four.yml",
+                                    "detect --camera four.yml a.pgm --out d.jsonl",
+                                    "generate --camera four.yml --count 1 --out g"}) {
+    expectRefused(command, 2, "opencv-fisheye or opencv-pinhole");
+    EXPECT_EQ(dlsd(command + " --format opencv-fisheye").code, 0) << command;
+  }
+  EXPECT_EQ(dlsd::loadCamera((folder / "g/cameras/four.yaml").string()).modelName(),
+            "kannala_brandt");
+  expectRefused("detect --data g --format kalibr", 2, "--format");
+  expectRefused("detect --camera four.yml a.pgm --format punch-card", 2, "kalibr");
+}
+
 TEST_F(CameraCli, CheckGoesThroughEveryPixel) {
   const Result result = dlsd("camera check rig.yaml");
   EXPECT_EQ(result.code, 0) << result.err;
@@ -153,6 +187,28 @@ TEST_F(CameraCli, CheckGoesThroughEveryPixel) {
         "80.0, 79.5, 59.5], distortion_coeffs: [], resolution: [161, 120]}\n");
   expectRefused("camera check larger.yaml --image small.pgm", 2, "161x120");
   expectRefused("camera check rig.yaml --image small.pgm", 2, "rig.yaml:cam1");
+}
+
+// The calibrations of the repository, one file of each camera.
+TEST_F(CameraCli, CheckPassesEveryFixture) {
+  int checked = 0;
+  for (const char* sub : {"", "/formats"}) {
+    for (const auto& entry :
+         fs::directory_iterator(DLSD_SOURCE_DIR "/fixtures/calibrations" + std::string(sub))) {
+      const std::string path = entry.path().string();
+      if (!path.ends_with(".kalibr.yaml") && (*sub != 0 || !path.ends_with(".yaml"))) {
+        continue;
+      }
+      const Result result = dlsd("camera check '" + path + "'");
+      EXPECT_EQ(result.code, 0) << path << "\n" << result.out;
+      EXPECT_EQ(result.err, "") << path;
+      EXPECT_EQ(result.out.find("none: a panorama is not radial") != std::string::npos,
+                path.ends_with("sphere.kalibr.yaml"))
+          << path;
+      ++checked;
+    }
+  }
+  EXPECT_GE(checked, 19);
 }
 
 TEST_F(CameraCli, CheckWithAnImageWithoutLinesGivesNoVerdict) {
@@ -191,6 +247,46 @@ TEST_F(CameraCli, CheckTellsAWrongCalibrationByThePhotographs) {
               testing::ContainsRegex("the calibration is off; .* -0\\.[0-9]* .*should be larger"));
 }
 
+TEST_F(CameraCli, CheckTakesEachPhotographOnce) {
+  write("a.pgm", "P5 160 120 255\n" + std::string(160 * 120, 'x'));
+  write("b.pgm", "P5 160 120 255\n" + std::string(160 * 120, 'y'));
+  fs::copy_file(folder / "a.pgm", folder / "c.pgm");
+  EXPECT_EQ(dlsd("camera check wide.yaml --image a.pgm --image b.pgm").code, 0);
+  expectRefused("camera check wide.yaml --image a.pgm --image b.pgm --image c.pgm",
+                2,
+                "c.pgm is the same picture as a.pgm");
+}
+
+// The lens ends in the image, at 65 degrees, and the calibration does not say so.
+TEST_F(CameraCli, CheckDoesNotTakeTheImageCircleForABowedEdge) {
+  const std::string camera =
+      "cam0:\n  camera_model: pinhole\n  distortion_model: equidistant\n  intrinsics: [190.5, "
+      "190.5, "
+      "255.5, 255.5]\n  distortion_coeffs: [0.0, 0.0, 0.0, 0.0]\n  resolution: [512, 512]\n";
+  write("open.yaml", camera);
+  write("circle.yaml", camera + "  max_field_angle: 1.134\n");
+  ASSERT_EQ(dlsd("generate --camera circle.yaml --count 2 --seed 5 --out d").code, 0);
+  const std::string images = " --image d/images/000000.png --image d/images/000001.png";
+  const Result good = dlsd("camera check open.yaml" + images);
+  EXPECT_EQ(good.code, 0) << good.err;
+  EXPECT_THAT(good.out, Not(HasSubstr("the calibration is off"))) << good.out;
+  // No line of the circle is among the lines.
+  EXPECT_THAT(good.out, Not(HasSubstr(" 70 - 80 "))) << good.out;
+}
+
+// In a real one, of which the calibration is good.
+TEST_F(CameraCli, CheckAcquitsTheCalibrationOfAPhotographWithACircle) {
+  const std::string photo = DLSD_SOURCE_DIR "/../shared/photos/matsuren_ds_building";
+  if (!fs::exists(photo + ".jpg")) {
+    GTEST_SKIP() << "no folder with photographs";
+  }
+  const Result result =
+      dlsd("camera check '" + photo + ".kalibr.yaml' --image '" + photo + ".jpg'");
+  EXPECT_EQ(result.code, 0) << result.err;
+  EXPECT_THAT(result.out, HasSubstr("straightness: "));
+  EXPECT_THAT(result.out, Not(HasSubstr("the calibration is off"))) << result.out;
+}
+
 TEST_F(CameraCli, ConvertFitsAModelAndWritesIt) {
   const Result result =
       dlsd("camera convert wide.yaml --to kannala_brandt --out kb.yaml --max-px 0.1");
@@ -221,6 +317,57 @@ TEST_F(CameraCli, ConvertChangesTheFileFormat) {
   ASSERT_EQ(dlsd("camera convert wide.json --out again.yaml").code, 0);
   EXPECT_EQ(dlsd::loadCamera((folder / "again.yaml").string()),
             dlsd::loadCamera((folder / "wide.yaml").string()));
+}
+
+TEST_F(CameraCli, ConvertSaysWhenTheModelCannotFollow) {
+  // Pinholes see no 97 degrees.
+  const Result poor = dlsd("camera convert rig.yaml:cam1 --to pinhole --out p.yaml");
+  EXPECT_EQ(poor.code, 0);
+  EXPECT_EQ(std::count(poor.err.begin(), poor.err.end(), '\n'), 1) << poor.err;
+  EXPECT_THAT(poor.err,
+              AllOf(HasSubstr("dlsd: rig.yaml:cam1 (cam1): pinhole does not say this camera"),
+                    HasSubstr("pixels do not project"),
+                    HasSubstr("--max-angle"),
+                    HasSubstr("--max-px")));
+  EXPECT_TRUE(fs::exists(folder / "p.yaml"));
+  EXPECT_EQ(dlsd("camera convert wide.yaml --to kannala_brandt").err, "");
+  // Who gives a bound has been told.
+  EXPECT_EQ(dlsd("camera convert wide.yaml --to pinhole --max-angle 20 --max-px 9").err, "");
+}
+
+TEST_F(CameraCli, ConvertLeavesOutALimitThatTheFormatCannotSay) {
+  // The pixels beyond 40 degrees are left out, which is a limit of the result.
+  const Result result = dlsd(
+      "camera convert wide.yaml --to kannala_brandt --max-angle 40 --out kb.txt --to-format "
+      "colmap");
+  ASSERT_EQ(result.code, 0) << result.err;
+  EXPECT_THAT(result.out, HasSubstr("is not in the file: colmap has no word for it"));
+  const dlsd::Camera kb = dlsd::loadCamera((folder / "kb.txt").string());
+  EXPECT_EQ(kb.modelName(), "kannala_brandt");
+  EXPECT_EQ(kb.maxFieldAngleLimit(), M_PI);
+  // A limit of the source is the user's, and not dropped.
+  write("limited.yaml", std::string(kWide) + "  max_field_angle: 0.7\n");
+  expectRefused("camera convert limited.yaml --out l.txt --to-format colmap", 2, "max_field_angle");
+  // Where the format can say it, it stays.
+  ASSERT_EQ(dlsd("camera convert wide.yaml --max-angle 40 --out l.json --to-format basalt").code,
+            0);
+  EXPECT_NEAR(
+      dlsd::loadCamera((folder / "l.json").string()).maxFieldAngleLimit(), 40 * M_PI / 180, 1e-12);
+}
+
+TEST_F(CameraCli, ConvertNumbersCamerasAsKalibrReadsThem) {
+  write("cameras.txt", "1 PINHOLE 160 120 80 80 80 60\n7 PINHOLE 160 120 90 90 80 60\n");
+  const Result result = dlsd("camera convert cameras.txt --out chain.yaml");
+  ASSERT_EQ(result.code, 0) << result.err;
+  EXPECT_THAT(result.out, HasSubstr("in the file cam1 is cam0, cam7 is cam1\n"));
+  const auto cameras = dlsd::loadCameras((folder / "chain.yaml").string());
+  ASSERT_EQ(cameras.size(), 2U);
+  EXPECT_EQ(cameras[0].name, "cam0");
+  EXPECT_EQ(cameras[1].name, "cam1");
+  EXPECT_EQ(cameras[1].camera.params()[0], 90);
+  EXPECT_THAT(dlsd("camera convert cameras.txt:cam7 --out one.yaml").out,
+              HasSubstr("in the file cam7 is cam0\n"));
+  EXPECT_THAT(dlsd("camera convert rig.yaml --out rig2.yaml").out, Not(HasSubstr("in the file")));
 }
 
 TEST_F(CameraCli, ConvertRefusesWhatIsNotGoodEnough) {
@@ -343,11 +490,68 @@ TEST_F(CameraCli, RectifyCropsWithoutBorders) {
   expectRefused(mirror + "--rotate 180,0,0 --fov 100", 2, "axis of the view");
 }
 
+TEST_F(CameraCli, RectifyMakesTheCameraOfAPanorama) {
+  ASSERT_EQ(dlsd("camera rectify wide.yaml --view equirectangular --fov 180 --size 90x45 "
+                 "--out-camera view.yaml")
+                .code,
+            0);
+  const dlsd::Camera view = dlsd::loadCamera((folder / "view.yaml").string());
+  EXPECT_EQ(view.modelName(), "equirectangular");
+  const Eigen::Vector3d right = *view.unproject({89.5, 22.0});
+  EXPECT_LE((right - Eigen::Vector3d::UnitX()).norm(), 1e-12);
+  // A view of it: a panorama of the pinhole's image, seen by that pinhole.
+  writeImage("a.pgm", 1, 8);
+  ASSERT_EQ(dlsd("camera rectify flat.yaml a.pgm --view equirectangular --fov 100 --size 400x340 "
+                 "--out pano --out-camera pano.yaml")
+                .code,
+            0);
+  ASSERT_EQ(dlsd("camera rectify pano.yaml pano/a.png --fov 80 --size 100x80 --out back").code, 0);
+  const dlsd::Image back = image("back/a.png");
+  const double f = 50 / std::tan(40 * M_PI / 180);
+  for (int y = 10; y < 70; ++y) {
+    for (int x = 10; x < 90; ++x) {
+      const double u = (x - 49.5) / f * 80 + 79.5, v = (y - 39.5) / f * 80 + 59.5;
+      EXPECT_NEAR(valueOf(back, x, y, 0), u + v / 2, 2);
+    }
+  }
+}
+
+// Backwards through the seam: no line there, linear or cubic.
+TEST_F(CameraCli, RectifyGoesAcrossTheSeam) {
+  write("sphere.yaml", "model: equirectangular\nresolution: [160, 120]\n");
+  std::string content = "P5 160 120 255\n";
+  for (int y = 0; y < 120; ++y) {
+    for (int x = 0; x < 160; ++x) {
+      content += char(std::lround(128 + 100 * std::cos((x + 0.5) / 160 * 2 * M_PI)));
+    }
+  }
+  write("s.pgm", content);
+  for (const char* interpolation : {"linear", "cubic"}) {
+    const Result result = dlsd(std::string("camera rectify sphere.yaml s.pgm --rotate 180,0,0 ") +
+                               "--fov 90 --size 80x60 --out v --interpolation " + interpolation);
+    ASSERT_EQ(result.code, 0) << result.err;
+    EXPECT_THAT(result.out, HasSubstr("100.00 % of the view's pixels"));
+    const dlsd::Image view = image("v/s.png");
+    for (int y = 0; y < 60; ++y) {
+      for (int x = 0; x < 80; ++x) {
+        // The longitude from the seam on.
+        const double longitude = std::atan((x - 39.5) / 40);
+        EXPECT_NEAR(valueOf(view, x, y, 0), 128 + 100 * std::cos(longitude), 1.5) << x << " " << y;
+      }
+    }
+  }
+  for (const char* view : {"equirectangular", "pinhole --fov 100"}) {
+    const Result crop = dlsd(std::string("camera rectify sphere.yaml --crop --rotate 180,0,0 ") +
+                             "--mask m.png --view " + view);
+    EXPECT_EQ(crop.code, 0) << crop.err;
+  }
+}
+
 TEST_F(CameraCli, RectifyRefusesWithASentence) {
   writeImage("a.pgm", 1, 8);
   const std::string rectify = "camera rectify wide.yaml a.pgm --out v ";
   expectRefused(rectify + "--fov 180", 2, "less than 180 degrees");
-  expectRefused(rectify + "--fov 0", 2, "--fov");
+  expectRefused(rectify + "--fov 0", 2, "allowed are degrees in (0, 180)\n");
   expectRefused(rectify + "--view cylindrical --fov 361", 2, "(0, 360]");
   expectRefused(rectify + "--size 100", 2, "WxH");
   expectRefused(rectify + "--size 0x10", 2, "0x10");
@@ -361,6 +565,8 @@ TEST_F(CameraCli, RectifyRefusesWithASentence) {
   expectRefused("camera rectify rig.yaml a.pgm --out v", 2, "rig.yaml:cam0");
   expectRefused(
       "camera rectify wide.yaml --view cylindrical --out-camera c.yaml", 2, "no camera model");
+  expectRefused(rectify + "--view cylindrical --out-camera c.yaml", 2, "no camera model");
+  expectRefused("camera rectify rig.yaml:cam1 a.pgm --out v --crop", 2, "give one by --fov");
   expectRefused("camera rectify wide.yaml --maps wide.yaml", 2, "is the input");
   // One bad image among many.
   write("bad.png", "no image");

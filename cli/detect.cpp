@@ -11,6 +11,7 @@
 
 #include "cameras/calibration/calibration.h"
 #include "cameras/calibration/files.h"
+#include "cli/camera_commands.h"
 #include "cli/command.h"
 #include "cli/overlay.h"
 #include "detector/detector.h"
@@ -21,7 +22,7 @@ namespace dlsd::cli {
 namespace {
 
 struct Arguments {
-  std::string camera, data, out = "-", overlay, mask;
+  std::string camera, format, data, out = "-", overlay, mask;
   std::vector<std::string> images;
   bool paper = false, time = false;
 };
@@ -41,8 +42,10 @@ struct Work {
 Work workOf(const Arguments& arguments) {
   Work work;
   if (!arguments.data.empty()) {
-    if (!arguments.camera.empty() || !arguments.images.empty()) {
-      throw InputError("--data brings its own images and cameras, neither may be given with it");
+    if (!arguments.camera.empty() || !arguments.images.empty() || !arguments.format.empty()) {
+      throw InputError(
+          "--data brings its own images and cameras, neither they nor --format may be given with "
+          "it");
     }
     const Dataset dataset(arguments.data);
     work.inputs = filesOf(dataset);
@@ -60,7 +63,7 @@ Work workOf(const Arguments& arguments) {
     throw InputError(arguments.camera + ": the name is not UTF-8, as the records need it");
   }
   work.inputs.push_back(calibrationFile(arguments.camera));
-  work.cameras.emplace(arguments.camera, loadCamera(arguments.camera));
+  work.cameras.emplace(arguments.camera, loadCamera(arguments.camera, arguments.format));
   for (const std::string& image : arguments.images) {
     work.tasks.push_back({image, image, arguments.camera});
     work.inputs.push_back(image);
@@ -90,10 +93,8 @@ std::vector<DetectionLine> detectLines(Detector& detector,
 Image readMask(const std::string& path, const std::map<std::string, Camera>& cameras) {
   Image mask = readImage(path);
   if (mask.channels != 1 || mask.bits != 8) {
-    throw InputError(fmt::format("{}: a mask has one channel of 8 bits, this has {} of {}",
-                                 path,
-                                 mask.channels,
-                                 mask.bits));
+    throw InputError(fmt::format(
+        "{}: a mask has one channel of 8 bits, this has {} of {}", path, mask.channels, mask.bits));
   }
   for (const auto& [name, camera] : cameras) {
     if (mask.width != camera.width() || mask.height != camera.height()) {
@@ -240,6 +241,7 @@ Run addDetect(CLI::App& command) {
       .add_option(
           "--camera", arguments->camera, "Calibration file, or file:camera if it holds several")
       ->type_name("FILE");
+  addCalibrationFormat(command, &arguments->format);
   command.add_option("images", arguments->images, "Images, all of the camera's size")
       ->type_name("FILE");
   command
@@ -250,8 +252,7 @@ Run addDetect(CLI::App& command) {
           "--out", arguments->out, "Detections, one JSON object per line; - is standard output")
       ->type_name("FILE")
       ->capture_default_str();
-  command
-      .add_option("--mask", arguments->mask, "8-bit grey image: no lines where it is black (0)")
+  command.add_option("--mask", arguments->mask, "8-bit grey image: no lines where it is black (0)")
       ->type_name("FILE");
   command.add_flag("--paper", arguments->paper, "The algorithm as published, not the default");
   command

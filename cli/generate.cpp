@@ -15,6 +15,7 @@
 
 #include "cameras/calibration/calibration.h"
 #include "cameras/calibration/files.h"
+#include "cli/camera_commands.h"
 #include "cli/command.h"
 #include "synth/dataset/verify.h"
 #include "synth/scene.h"
@@ -24,6 +25,7 @@ namespace {
 
 struct Arguments {
   std::vector<std::string> cameras;
+  std::string format;
   std::string shard = "0/1";
   std::string encoding = "linear";
   std::vector<std::string> planes;
@@ -128,7 +130,7 @@ int run(Arguments& arguments) {
       addRandomCameras(path, arguments, &options);
       continue;
     }
-    options.cameras.emplace_back(nameOf(path), loadCamera(path));
+    options.cameras.emplace_back(nameOf(path), loadCamera(path, arguments.format));
     if (!names.insert(options.cameras.back().first).second) {
       throw InputError("--camera " + path + ": another camera is named \"" +
                        options.cameras.back().first + "\" too, rename one of the files");
@@ -178,6 +180,7 @@ Run addGenerate(CLI::App& command) {
       ->type_name("FILE")
       ->expected(1)
       ->take_all();
+  addCalibrationFormat(command, &arguments->format);
   command.add_option("--out", options.out, "Folder for the dataset")->type_name("DIR");
   command
       .add_option("--config",
@@ -260,6 +263,7 @@ Run addGenerate(CLI::App& command) {
                   "Make nothing: check that every file of this dataset is there and unchanged")
       ->type_name("DIR")
       ->excludes("--camera")
+      ->excludes("--format")
       ->excludes("--out");
   command.footer(
       "Examples:\n"

@@ -133,9 +133,10 @@ void refuseNoText(std::string_view text, const std::string& source) {
 
 /// A number at the very end of a file may be a part of one.
 void refuseCutOff(std::string_view text, const std::string& source) {
-  const size_t last = text.find_last_not_of(" \t\r\n");
-  if (std::string_view("]}>\"'").find(text[last]) == std::string_view::npos &&
-      text.find('\n', last) == std::string_view::npos) {
+  text.remove_prefix(text.rfind('\n') + 1);  // npos + 1 is 0
+  if (text.find('#') != std::string_view::npos) return;  // the comment is what may be cut off
+  text.remove_prefix(text.find_last_of(" \t\r") + 1);
+  if (parseNumber(text)) {
     throw InputError(source +
                      ": ends without a line break and may be cut off: please add one if the file "
                      "is complete");

@@ -112,6 +112,12 @@ TEST_F(Calibration, KeysOfKalibrThatSayNothingAboutIntrinsicsAreIgnored) {
   const std::string extra = R"(  rostopic: /cam0/image_raw
   cam_overlaps: [1]
   timeshift_cam_imu: 0.0001
+  line_delay: 1.0e-05
+  T_imu_cam:
+    - [1.0, 0.0, 0.0, 0.0]
+    - [0.0, 1.0, 0.0, 0.0]
+    - [0.0, 0.0, 1.0, 0.0]
+    - [0.0, 0.0, 0.0, 1.0]
   T_cam_imu:
     - [1.0, 0.0, 0.0, 0.0]
     - [0.0, 1.0, 0.0, 0.0]

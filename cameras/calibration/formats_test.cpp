@@ -203,6 +203,9 @@ TEST(Formats, ThatMayBeEitherAreRefusedWithBothNames) {
   EXPECT_THAT(refusal(fixture("tum_vi.kalibr.yaml") + "model_type: PINHOLE\n"),
               HasSubstr("may be kalibr or camodocal: please choose the format"));
   EXPECT_THAT(refusal("4 1 2 3 4\n640 480\n"), HasSubstr("may be tum or ocamcalib"));
+  // Words that only begin as a camera's name are none.
+  const std::string vins = fixture("tum_vi.camodocal.yaml");
+  EXPECT_EQ(only(vins + "cam0_calib: \"cam0.yaml\"\ncam1_calib: \"cam1.yaml\"\n"), only(vins));
 }
 
 TEST(Formats, CutOffNumbersAreNotedByTheMissingLineEnd) {
@@ -216,6 +219,21 @@ TEST(Formats, CutOffNumbersAreNotedByTheMissingLineEnd) {
     text.erase(text.find_last_not_of("\n") + 1);
     EXPECT_THAT(refusal(text), HasSubstr("ends without a line break")) << file;
   }
+}
+
+TEST(Formats, WhatCannotBeCutOffNeedsNoLineEnd) {
+  const std::string orb = fixture("tum_vi.orbslam3.yaml");
+  const std::string line = "Camera.type: \"KannalaBrandt8\"\n";
+  const std::string rest = replaced(orb, line, "");
+  EXPECT_EQ(only(rest + "Camera.type: KannalaBrandt8"), only(orb));
+  EXPECT_EQ(only(orb + "Camera.RGB: 1  # grey, 1 of 3"), only(orb));
+  EXPECT_EQ(only(orb + "Camera.RGB: 1 "), only(orb));
+  EXPECT_EQ(only(orb + "# 2021"), only(orb));
+  EXPECT_THAT(refusal(orb + "Camera.RGB: 1"), HasSubstr("ends without a line break"));
+  const std::string colmap = fixture("tum_vi.colmap.txt");
+  EXPECT_EQ(only(colmap + "# 1 camera"), only(colmap));
+  const std::string vins = fixture("tum_vi.camodocal.yaml");
+  EXPECT_EQ(only(vins + "imu_topic: /imu0"), only(vins));
 }
 
 // Every prefix of everything that we write is refused.
@@ -339,6 +357,13 @@ TEST(Basalt, UcmIsTheUnifiedModelWithOtherParameters) {
   EXPECT_THAT(refusal(ucm("1.0")),
               AllOf(HasSubstr("alpha = 1 is out of range"), HasSubstr("[0, 0.99")));
   EXPECT_THAT(refusal(ucm("-0.1")), HasSubstr("alpha = -0.1 is out of range"));
+}
+
+TEST(Basalt, MayHaveComments) {
+  const std::string text = fixture("tum_vi.basalt.json");
+  EXPECT_EQ(only(replaced(text, "{", "{\"comment\": \"of the left one\", ")), only(text));
+  EXPECT_EQ(only(replaced(text, "\"intrinsics\"", "\"comment\": \"x\", \"intrinsics\"")),
+            only(text));
 }
 
 TEST(Basalt, NamesPlaces) {
@@ -497,6 +522,71 @@ TEST(Ros, NamesModels) {
               HasSubstr("(k5) = 0.5"));
 }
 
+// As `rostopic echo -n1 /camera_info` and `ros2 topic echo --once /camera_info` print it.
+TEST(Ros, ReadsMessages) {
+  const std::string ros1 = R"(header: 
+  seq: 12
+  stamp: 
+    secs: 1600000000
+    nsecs:  12345678
+  frame_id: "camera"
+height: 480
+width: 640
+distortion_model: "plumb_bob"
+D: [-0.25, 0.125, 0.001, -0.002, 0.0]
+K: [500.0, 0.0, 320.5, 0.0, 501.0, 240.5, 0.0, 0.0, 1.0]
+R: [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]
+P: [450.0, 0.0, 321.0, 0.0, 0.0, 451.0, 241.0, 0.0, 0.0, 0.0, 1.0, 0.0]
+binning_x: 0
+binning_y: 0
+roi: 
+  x_offset: 0
+  y_offset: 0
+  height: 0
+  width: 0
+  do_rectify: False
+---
+)";
+  const LoadedCalibration loaded = parseCalibration(ros1, "f");
+  EXPECT_EQ(loaded.format, "ros");
+  const Camera camera = loaded.cameras.at(0).camera;
+  EXPECT_EQ(camera.modelName(), "pinhole_radtan");
+  EXPECT_THAT(camera.params(), ElementsAre(500, 501, 320.5, 240.5, -0.25, 0.125, 0.001, -0.002, 0));
+  EXPECT_EQ(camera.width(), 640);
+  EXPECT_EQ(camera.height(), 480);
+
+  std::string ros2 = ros1;
+  for (const auto& [from, to] : {std::pair("\nD:", "\nd:"),
+                                 {"\nK:", "\nk:"},
+                                 {"\nR:", "\nr:"},
+                                 {"\nP:", "\np:"},
+                                 {"  seq: 12\n", ""},
+                                 {"secs:", "sec:"},
+                                 {"nsecs:", "nanosec:"},
+                                 {"False", "false"}}) {
+    ros2 = replaced(ros2, from, to);
+  }
+  EXPECT_EQ(only(ros2), camera);
+  const std::string lists = replaced(
+      ros2, "[-0.25, 0.125, 0.001, -0.002, 0.0]", "\n- -0.25\n- 0.125\n- 0.001\n- -0.002\n- 0.0");
+  EXPECT_EQ(only(lists), camera);
+
+  EXPECT_EQ(only(replaced(ros1, "binning_x: 0", "binning_x: 1")), camera);
+  EXPECT_THAT(refusal(replaced(ros1, "binning_x: 0", "binning_x: 2")), HasSubstr("binning_x"));
+  EXPECT_EQ(
+      only(replaced(replaced(ros1, "  height: 0", "  height: 480"), "  width: 0", "  width: 640")),
+      camera);
+  EXPECT_THAT(refusal(replaced(ros1, "  height: 0", "  height: 100")),
+              HasSubstr("roi is a part of 0 x 100 px"));
+  EXPECT_THAT(refusal(replaced(ros1, "x_offset: 0", "x_offset: 8")), HasSubstr("roi.x_offset"));
+  EXPECT_THAT(refusal(replaced(ros1, "\nK:", "\nk:")), HasSubstr("f"));
+  EXPECT_THAT(refusal(ros1 + ros1), HasSubstr("more than one YAML document"));
+  // The file form may have them, too.
+  const std::string file = fixture("webcam.ros.yaml");
+  EXPECT_EQ(only("binning_x: 1\n" + file), only(file));
+  EXPECT_THAT(refusal("binning_y: 3\n" + file), HasSubstr("binning_y"));
+}
+
 TEST(Camodocal, NamesModelsAndParts) {
   const std::string text = fixture("tum_vi.camodocal.yaml");
   EXPECT_THAT(refusal(replaced(text, "KANNALA_BRANDT", "PINHOLE_FULL")),
@@ -575,9 +665,19 @@ TEST(OrbSlam3, HoldsOneOrTwoCameras) {
   EXPECT_THAT(refusal(text + "Camera.fx: 190.5\n"), HasSubstr("both Camera.fx and Camera1.fx"));
   EXPECT_THAT(refusal(text + "Camera1.k5: 190.5\n"), HasSubstr("unknown key \"Camera1.k5\""));
   EXPECT_THAT(refusal(text + "LEFT.K: 1\n"), HasSubstr("\"LEFT.K\""));
-  EXPECT_THAT(
-      refusal(replaced(text, "KannalaBrandt8", "Rectified")),
-      AllOf(HasSubstr("Camera.type = \"Rectified\""), HasSubstr("KannalaBrandt8, PinHole")));
+  EXPECT_THAT(refusal(replaced(text, "KannalaBrandt8", "Fisheye")),
+              AllOf(HasSubstr("Camera.type = \"Fisheye\""),
+                    HasSubstr("KannalaBrandt8, PinHole, Rectified")));
+  EXPECT_EQ(only(text + "System.thFarPoints: 20.0\nthFarPoints: 20.0\n"), only(text));
+  // Already rectified: a pinhole, and no distortion beside.
+  EXPECT_THAT(refusal(replaced(text, "KannalaBrandt8", "Rectified")),
+              HasSubstr("unknown key \"Camera1.k1\""));
+  const Camera rectified = only(
+      "File.version: \"1.0\"\nCamera.type: \"Rectified\"\nCamera1.fx: 435.25\nCamera1.fy: 435.5\n"
+      "Camera1.cx: 367.5\nCamera1.cy: 252.25\nCamera.width: 752\nCamera.height: 480\n"
+      "Stereo.b: 0.11\nStereo.ThDepth: 60.0\n");
+  EXPECT_EQ(rectified.modelName(), "pinhole");
+  EXPECT_THAT(rectified.params(), ElementsAre(435.25, 435.5, 367.5, 252.25));
 }
 
 TEST(Tum, AreRelativeOrAbsoluteAsCxAndCySay) {

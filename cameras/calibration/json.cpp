@@ -86,9 +86,11 @@ Camera readBasaltCamera(const Field& entry, std::pair<int, int> size) {
 }
 
 constexpr std::array<std::string_view, 1> kValue{"value0"};
+constexpr std::array<std::string_view, 1> kBasaltComment{"comment"};
 constexpr std::array<std::string_view, 2> kBasaltNeeded{"intrinsics", "resolution"};
 /// Poses, IMU, vignette and time, which say nothing about the intrinsics.
-constexpr std::array<std::string_view, 14> kBasaltIgnored{"T_imu_cam",
+constexpr std::array<std::string_view, 15> kBasaltIgnored{"comment",
+                                                          "T_imu_cam",
                                                           "calib_accel_bias",
                                                           "calib_gyro_bias",
                                                           "imu_update_rate",
@@ -110,7 +112,7 @@ bool isBasalt(const Document& document) {
 }
 
 Loaded readBasalt(const Document& document) {
-  document.field().expectKeys(kValue);
+  document.field().expectKeys(kValue, {}, kBasaltComment);
   const Field value = document.field().at("value0");
   value.expectKeys(kBasaltNeeded, {}, kBasaltIgnored);
   const Field intrinsics = value.at("intrinsics");

@@ -34,9 +34,14 @@ constexpr std::array<KalibrModel, 11> kModels{{
     {"equirectangular", "none", "equirectangular", 4, 0, true},
 }};
 
-/// Keys of Kalibr that say nothing about the intrinsics.
-constexpr std::array<std::string_view, 5> kIgnoredKeys{
-    "rostopic", "T_cn_cnm1", "T_cam_imu", "cam_overlaps", "timeshift_cam_imu"};
+/// Keys of Kalibr, and of OpenVINS, that say nothing about the intrinsics.
+constexpr std::array<std::string_view, 7> kIgnoredKeys{"rostopic",
+                                                       "T_cn_cnm1",
+                                                       "T_cam_imu",
+                                                       "T_imu_cam",
+                                                       "cam_overlaps",
+                                                       "timeshift_cam_imu",
+                                                       "line_delay"};
 constexpr std::array<std::string_view, 5> kNeededKeys{
     "camera_model", "intrinsics", "distortion_model", "distortion_coeffs", "resolution"};
 constexpr std::string_view kMaxFieldAngle = "max_field_angle";
@@ -91,10 +96,9 @@ Camera readEntry(const Field& entry) {
 }  // namespace
 
 bool isKalibr(const Document& document) {
-  return std::any_of(
-      document.root.keys.begin(), document.root.keys.end(), [](const std::string& key) {
-        return key.size() > 3 && key.starts_with("cam") && key[3] >= '0' && key[3] <= '9';
-      });
+  return std::any_of(document.root.keys.begin(),
+                     document.root.keys.end(),
+                     [](const std::string& key) { return cameraNumber(key).has_value(); });
 }
 
 Loaded readKalibr(const Document& document) {

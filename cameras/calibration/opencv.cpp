@@ -479,9 +479,49 @@ constexpr std::array<std::string_view, 3> kRosIgnored{
     "camera_name", "rectification_matrix", "projection_matrix"};
 constexpr std::array<std::string_view, 3> kRosModels{
     "plumb_bob", "rational_polynomial", "equidistant"};
+constexpr std::array<std::string_view, 4> kRosOptional{
+    "binning_x", "binning_y", "roi", "max_field_angle"};
+
+/// The words for the same in a file and in the messages of ROS 1 and 2, as `rostopic echo` and
+/// `ros2 topic echo` print them.
+struct RosKeys {
+  std::array<std::string_view, 5> needed;  ///< Width, height, matrix, model, distortion.
+  std::array<std::string_view, 3> ignored;
+};
+constexpr RosKeys kRosFile{kRosNeeded, kRosIgnored};
+constexpr RosKeys kRos1Message{{"width", "height", "K", "distortion_model", "D"},
+                               {"header", "R", "P"}};
+constexpr RosKeys kRos2Message{{"width", "height", "k", "distortion_model", "d"},
+                               {"header", "r", "p"}};
+
+bool isRosMessage(const Document& document, const RosKeys& keys) {
+  const Node* const K = document.root.find(keys.needed[2]);
+  return K != nullptr && K->isList() && document.root.find("distortion_model") != nullptr;
+}
+
+/// Pixels that are put together, or a part of the sensor, are another image than the calibrated.
+void refuseBinningAndRoi(const Field& root, std::pair<int, int> size) {
+  for (const std::string_view key : {"binning_x", "binning_y"}) {
+    if (root.has(key)) (void)root.at(key).integer(0, 1);
+  }
+  if (!root.has("roi")) return;
+  constexpr std::array<std::string_view, 4> kNeeded{"x_offset", "y_offset", "height", "width"};
+  constexpr std::array<std::string_view, 1> kDoRectify{"do_rectify"};
+  const Field roi = root.at("roi");
+  roi.expectKeys(kNeeded, {}, kDoRectify);
+  (void)roi.at("x_offset").integer(0, 0);
+  (void)roi.at("y_offset").integer(0, 0);
+  const std::pair<int, int> part{roi.at("width").integer(0, Camera::kMaxImageSize),
+                                 roi.at("height").integer(0, Camera::kMaxImageSize)};
+  if (part != size && part != std::pair<int, int>(0, 0)) {
+    roi.fail("is a part of " + std::to_string(part.first) + " x " + std::to_string(part.second) +
+             " px, allowed are the whole image and 0 x 0, which means that");
+  }
+}
 }  // namespace
 
 bool isRos(const Document& document) {
+  if (isRosMessage(document, kRos1Message) || isRosMessage(document, kRos2Message)) return true;
   const Node* const K = document.root.find("camera_matrix");
   return K != nullptr && K->isMap() && !K->opencv_matrix && K->find("type_id") == nullptr &&
          (document.root.find("distortion_model") != nullptr ||
@@ -491,16 +531,20 @@ bool isRos(const Document& document) {
 
 Loaded readRos(const Document& document) {
   const Field root = document.field();
-  root.expectKeys(kRosNeeded, kMaxFieldAngle, kRosIgnored);
-  const Field matrix_field = root.at("camera_matrix");
+  const RosKeys& keys = isRosMessage(document, kRos1Message)   ? kRos1Message
+                        : isRosMessage(document, kRos2Message) ? kRos2Message
+                                                               : kRosFile;
+  root.expectKeys(keys.needed, kRosOptional, keys.ignored);
+  const Field matrix_field = root.at(keys.needed[2]);
   const CameraMatrix K = cameraMatrix(matrix_field);
   refuseSkew(matrix_field, K.skew);
-  const std::pair<int, int> size{root.at("image_width").imageSize(),
-                                 root.at("image_height").imageSize()};
+  const std::pair<int, int> size{root.at(keys.needed[0]).imageSize(),
+                                 root.at(keys.needed[1]).imageSize()};
+  refuseBinningAndRoi(root, size);
   const double max_field_angle =
       root.has("max_field_angle") ? root.at("max_field_angle").maxFieldAngle() : M_PI;
   const size_t model = root.at("distortion_model").oneOf(kRosModels);
-  const Field D = root.at("distortion_coefficients");
+  const Field D = root.at(keys.needed[4]);
   if (kRosModels[model] == "equidistant") {
     return {{{"cam0", fisheyeCamera(root, K, D, size, max_field_angle)}}};
   }

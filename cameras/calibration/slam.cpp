@@ -182,7 +182,7 @@ constexpr std::array<CamodocalModel, 4> kCamodocalModels{
 // ORB-SLAM3
 
 /// Settings beside the camera's intrinsics, by how their names begin.
-constexpr std::array<std::string_view, 12> kOrbIgnoredPrefixes{"Stereo.",
+constexpr std::array<std::string_view, 13> kOrbIgnoredPrefixes{"Stereo.",
                                                                "RGBD.",
                                                                "IMU.",
                                                                "ORBextractor.",
@@ -191,6 +191,7 @@ constexpr std::array<std::string_view, 12> kOrbIgnoredPrefixes{"Stereo.",
                                                                "File.",
                                                                "loopClosing",
                                                                "ThDepth",
+                                                               "thFarPoints",
                                                                "DepthMapFactor",
                                                                "Tbc",
                                                                "Tlr"};
@@ -222,7 +223,17 @@ bool startsWithOneOf(std::string_view text, Names prefixes) {
   });
 }
 
-void refuseUnknownOrbKeys(const Field& root, Names camera_prefixes, bool fisheye) {
+/// Rectified: a pinhole whose image needs no undistortion.
+enum class OrbType { kFisheye, kPinhole, kRectified };
+constexpr std::array<std::string_view, 3> kOrbTypes{"KannalaBrandt8", "PinHole", "Rectified"};
+
+Names orbIntrinsics(OrbType type) {
+  return type == OrbType::kFisheye   ? Names(kOrbFisheye)
+         : type == OrbType::kPinhole ? Names(kOrbIntrinsics)
+                                     : Names(kOrbIntrinsics).first(4);
+}
+
+void refuseUnknownOrbKeys(const Field& root, Names camera_prefixes, OrbType type) {
   for (const std::string& key : root.node().keys) {
     if (key.starts_with("LEFT.") || key.starts_with("RIGHT.")) {
       root.fail("has " + inQuotes(key) +
@@ -236,7 +247,7 @@ void refuseUnknownOrbKeys(const Field& root, Names camera_prefixes, bool fisheye
     const size_t dot = std::min(key.find('.'), key.size() - 1) + 1;
     const std::string_view prefix = std::string_view(key).substr(0, dot);
     const std::string_view name = std::string_view(key).substr(dot);
-    const Names intrinsics = fisheye ? Names(kOrbFisheye) : Names(kOrbIntrinsics);
+    const Names intrinsics = orbIntrinsics(type);
     if ((prefix == "Camera." || has(camera_prefixes, prefix)) && has(kOrbCameraIgnored, name)) {
       continue;
     }
@@ -252,13 +263,13 @@ void refuseUnknownOrbKeys(const Field& root, Names camera_prefixes, bool fisheye
 
 Camera readOrbCamera(const Field& root,
                      std::string_view prefix,
-                     bool fisheye,
+                     OrbType type,
                      std::pair<int, int> size) {
   const auto number = [&](std::string_view name, std::string_view model) {
     return root.at(std::string(prefix) + std::string(name)).number(allowedBy(specOf(model, name)));
   };
   std::vector<double> params;
-  if (fisheye) {
+  if (type == OrbType::kFisheye) {
     for (const std::string_view name : kOrbFisheye)
       params.push_back(number(name, "kannala_brandt"));
     return root.camera("kannala_brandt", params, size);
@@ -309,8 +320,7 @@ bool isOrbSlam3(const Document& document) {
 
 Loaded readOrbSlam3(const Document& document) {
   const Field root = document.field();
-  constexpr std::array<std::string_view, 2> kTypes{"KannalaBrandt8", "PinHole"};
-  const bool fisheye = root.at("Camera.type").oneOf(kTypes) == 0;
+  const auto type = static_cast<OrbType>(root.at("Camera.type").oneOf(kOrbTypes));
   const bool numbered = root.has("Camera1.fx");
   if (numbered && root.has("Camera.fx")) {
     root.fail("has both Camera.fx and Camera1.fx, allowed is one of them");
@@ -321,14 +331,14 @@ Loaded readOrbSlam3(const Document& document) {
         return key.starts_with("Camera2.");
       });
   if (second) prefixes.emplace_back("Camera2.");
-  refuseUnknownOrbKeys(root, prefixes, fisheye);
+  refuseUnknownOrbKeys(root, prefixes, type);
   const std::pair<int, int> size{root.at("Camera.width").imageSize(),
                                  root.at("Camera.height").imageSize()};
   Loaded loaded;
   for (const std::string_view prefix : prefixes) {
     // The file's own numbers; the form without a number is camera 1 where there is a second.
     const std::string name = prefix == "Camera2." ? "cam2" : (numbered || second ? "cam1" : "cam0");
-    loaded.cameras.push_back({name, readOrbCamera(root, prefix, fisheye, size)});
+    loaded.cameras.push_back({name, readOrbCamera(root, prefix, type, size)});
   }
   return loaded;
 }

@@ -4,6 +4,7 @@
 #include <yaml-cpp/mark.h>
 #include <yaml-cpp/parser.h>
 
+#include <algorithm>
 #include <sstream>
 
 #include "cameras/calibration/tree.h"
@@ -16,13 +17,12 @@ class Receiver : public YAML::EventHandler {
  public:
   explicit Receiver(TreeBuilder* builder) : builder_(builder) {}
 
-  void OnDocumentStart(const YAML::Mark& /*mark*/) override {
-    if (++documents_ > 1) builder_->fail("holds more than one YAML document, allowed is one");
-  }
+  void OnDocumentStart(const YAML::Mark& /*mark*/) override { ++documents_; }
   void OnDocumentEnd() override {}
   void OnNull(const YAML::Mark& mark, YAML::anchor_t anchor) override {
     refuseAnchor(mark, anchor);
-    builder_->null();
+    // An empty document after the first: `rostopic echo` ends each message by ---.
+    if (documents_ == 1) builder_->null();
   }
   void OnAlias(const YAML::Mark& mark, YAML::anchor_t /*anchor*/) override {
     refuseAnchor(mark, 1);
@@ -31,6 +31,7 @@ class Receiver : public YAML::EventHandler {
                 const std::string& tag,
                 YAML::anchor_t anchor,
                 const std::string& value) override {
+    refuseSecondDocument();
     refuseAnchor(mark, anchor);
     builder_->scalar(value, tag == "!");
   }
@@ -38,6 +39,7 @@ class Receiver : public YAML::EventHandler {
                        const std::string& /*tag*/,
                        YAML::anchor_t anchor,
                        YAML::EmitterStyle::value /*style*/) override {
+    refuseSecondDocument();
     refuseAnchor(mark, anchor);
     builder_->beginList();
   }
@@ -46,14 +48,16 @@ class Receiver : public YAML::EventHandler {
                   const std::string& tag,
                   YAML::anchor_t anchor,
                   YAML::EmitterStyle::value /*style*/) override {
+    refuseSecondDocument();
     refuseAnchor(mark, anchor);
     builder_->beginMap(tag.ends_with("opencv-matrix"));
   }
   void OnMapEnd() override { builder_->end(); }
 
-  [[nodiscard]] int documents() const { return documents_; }
-
  private:
+  void refuseSecondDocument() const {
+    if (documents_ > 1) builder_->fail("holds more than one YAML document, allowed is one");
+  }
   void refuseAnchor(const YAML::Mark& mark, YAML::anchor_t anchor) const {
     if (anchor != 0) {
       builder_->fail("line " + std::to_string(mark.line + 1) +
@@ -64,6 +68,13 @@ class Receiver : public YAML::EventHandler {
   TreeBuilder* builder_;
   int documents_ = 0;
 };
+
+/// yaml-cpp has no place for what is still open at the end.
+std::string endsTooEarly(const std::string& text) {
+  const auto line = std::count(text.begin(), text.end(), '\n') + 1;
+  return "is not complete and correct YAML or JSON near its end, line " + std::to_string(line) +
+         ", column " + std::to_string(text.size() - (text.rfind('\n') + 1) + 1);
+}
 
 }  // namespace
 
@@ -76,6 +87,7 @@ Node parseYaml(const std::string& text, const std::string& source) {
     while (parser.HandleNextDocument(receiver)) {
     }
   } catch (const YAML::Exception& e) {
+    if (e.mark.is_null()) builder.fail(endsTooEarly(text));
     builder.fail("is not complete and correct YAML or JSON near line " +
                  std::to_string(e.mark.line + 1) + ", column " + std::to_string(e.mark.column + 1));
   }
