@@ -237,7 +237,7 @@ int run(const Arguments& arguments) {
     for (size_t i = 0; i + 1 < images.size(); ++i) {
       if (images[i].bytes == images.back().bytes) {
         throw InputError(
-            fmt::format("--image {}: is the same picture as {}, which would count twice",
+            fmt::format("{}: is the same picture as {}, which would count twice",
                         path,
                         arguments.images[i]));
       }

@@ -229,8 +229,8 @@ void drawRegion(cv::Mat& canvas, const cv::Rect& box, const Camera& camera) {
                                 extent.height + 4);
       const cv::Rect panel(left, top, w, h);
       const bool covers_another =
-          std::any_of(labels.begin(), labels.end(), [&](const cv::Rect& label) {
-            return (label & background).area() > 0;
+          std::any_of(labels.begin(), labels.end(), [&](const cv::Rect& other) {
+            return (other & background).area() > 0;
           });
       if ((background & panel) != background || covers_another) {
         continue;

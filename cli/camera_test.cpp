@@ -203,12 +203,12 @@ TEST_F(CameraCli, CheckPassesEveryFixture) {
       EXPECT_EQ(result.code, 0) << path << "\n" << result.out;
       EXPECT_EQ(result.err, "") << path;
       EXPECT_EQ(result.out.find("none: a panorama is not radial") != std::string::npos,
-                path.ends_with("sphere.kalibr.yaml"))
+                path.ends_with("/sphere.kalibr.yaml"))
           << path;
       ++checked;
     }
   }
-  EXPECT_GE(checked, 19);
+  EXPECT_GE(checked, 17);
 }
 
 TEST_F(CameraCli, CheckWithAnImageWithoutLinesGivesNoVerdict) {
@@ -254,7 +254,7 @@ TEST_F(CameraCli, CheckTakesEachPhotographOnce) {
   EXPECT_EQ(dlsd("camera check wide.yaml --image a.pgm --image b.pgm").code, 0);
   expectRefused("camera check wide.yaml --image a.pgm --image b.pgm --image c.pgm",
                 2,
-                "c.pgm is the same picture as a.pgm");
+                "c.pgm: is the same picture as a.pgm");
 }
 
 // The lens ends in the image, at 65 degrees, and the calibration does not say so.

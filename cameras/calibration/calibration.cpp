@@ -133,7 +133,7 @@ void refuseNoText(std::string_view text, const std::string& source) {
 
 /// A number at the very end of a file may be a part of one.
 void refuseCutOff(std::string_view text, const std::string& source) {
-  text.remove_prefix(text.rfind('\n') + 1);  // npos + 1 is 0
+  text.remove_prefix(text.rfind('\n') + 1);              // npos + 1 is 0
   if (text.find('#') != std::string_view::npos) return;  // the comment is what may be cut off
   text.remove_prefix(text.find_last_of(" \t\r") + 1);
   if (parseNumber(text)) {

@@ -226,10 +226,10 @@ TEST(Formats, WhatCannotBeCutOffNeedsNoLineEnd) {
   const std::string line = "Camera.type: \"KannalaBrandt8\"\n";
   const std::string rest = replaced(orb, line, "");
   EXPECT_EQ(only(rest + "Camera.type: KannalaBrandt8"), only(orb));
-  EXPECT_EQ(only(orb + "Camera.RGB: 1  # grey, 1 of 3"), only(orb));
-  EXPECT_EQ(only(orb + "Camera.RGB: 1 "), only(orb));
+  EXPECT_EQ(only(orb + "Camera.nFeatures: 1  # grey, 1 of 3"), only(orb));
+  EXPECT_EQ(only(orb + "Camera.nFeatures: 1 "), only(orb));
   EXPECT_EQ(only(orb + "# 2021"), only(orb));
-  EXPECT_THAT(refusal(orb + "Camera.RGB: 1"), HasSubstr("ends without a line break"));
+  EXPECT_THAT(refusal(orb + "Camera.nFeatures: 1"), HasSubstr("ends without a line break"));
   const std::string colmap = fixture("tum_vi.colmap.txt");
   EXPECT_EQ(only(colmap + "# 1 camera"), only(colmap));
   const std::string vins = fixture("tum_vi.camodocal.yaml");

@@ -4,7 +4,6 @@
 #include <yaml-cpp/mark.h>
 #include <yaml-cpp/parser.h>
 
-#include <algorithm>
 #include <sstream>
 
 #include "cameras/calibration/tree.h"
@@ -17,7 +16,10 @@ class Receiver : public YAML::EventHandler {
  public:
   explicit Receiver(TreeBuilder* builder) : builder_(builder) {}
 
-  void OnDocumentStart(const YAML::Mark& /*mark*/) override { ++documents_; }
+  void OnDocumentStart(const YAML::Mark& /*mark*/) override {
+    // Of some broken texts yaml-cpp makes empty documents without end.
+    if (++documents_ > 2) refuseSecondDocument();
+  }
   void OnDocumentEnd() override {}
   void OnNull(const YAML::Mark& mark, YAML::anchor_t anchor) override {
     refuseAnchor(mark, anchor);
@@ -69,13 +71,6 @@ class Receiver : public YAML::EventHandler {
   int documents_ = 0;
 };
 
-/// yaml-cpp has no place for what is still open at the end.
-std::string endsTooEarly(const std::string& text) {
-  const auto line = std::count(text.begin(), text.end(), '\n') + 1;
-  return "is not complete and correct YAML or JSON near its end, line " + std::to_string(line) +
-         ", column " + std::to_string(text.size() - (text.rfind('\n') + 1) + 1);
-}
-
 }  // namespace
 
 Node parseYaml(const std::string& text, const std::string& source) {
@@ -87,7 +82,6 @@ Node parseYaml(const std::string& text, const std::string& source) {
     while (parser.HandleNextDocument(receiver)) {
     }
   } catch (const YAML::Exception& e) {
-    if (e.mark.is_null()) builder.fail(endsTooEarly(text));
     builder.fail("is not complete and correct YAML or JSON near line " +
                  std::to_string(e.mark.line + 1) + ", column " + std::to_string(e.mark.column + 1));
   }
