@@ -376,6 +376,19 @@ Eigen::Matrix2d pixelFromPlane(const Camera& camera) {
   return A;
 }
 
+Camera scaledCamera(const Camera& camera, double factor, int width, int height) {
+  std::vector<double> params = camera.params();
+  const std::span<const ParamSpec> specs = camera.paramSpecs();
+  for (size_t i = 0; i < params.size(); ++i) {
+    if (isCentre(specs[i])) {
+      params[i] = (params[i] + 0.5) * factor - 0.5;
+    } else {
+      params[i] *= std::pow(factor, powerOfPixels(specs[i]));
+    }
+  }
+  return makeCamera(camera.modelName(), params, width, height, camera.maxFieldAngleLimit());
+}
+
 std::ostream& operator<<(std::ostream& out, const Camera& camera) {
   const auto precision = out.precision(17);
   out << camera.modelName() << "(";

@@ -95,6 +95,10 @@ template <class Model>
 /// kParams: of focal lengths and skew, or of aspect ratio and shear.
 [[nodiscard]] Eigen::Matrix2d pixelFromPlane(const Camera& camera);
 
+/// The camera of the same lens with a sensor of other pixels: 1 px of it is `factor` px of the new
+/// one, which has this size.
+[[nodiscard]] Camera scaledCamera(const Camera& camera, double factor, int width, int height);
+
 /// One line: model, parameters with 17 digits, size, limit.
 std::ostream& operator<<(std::ostream& out, const Camera& camera);
 inline void showValue(const Camera& camera, std::ostream& out) {

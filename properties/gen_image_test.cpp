@@ -1,0 +1,116 @@
+#include "properties/gen_image.h"
+
+#include <gtest/gtest.h>
+#include <rapidcheck.h>
+
+#include <array>
+#include <set>
+
+#include "properties/gen.h"
+
+namespace dlsd {
+namespace {
+
+TestImage draw(uint64_t seed, int max_side) {
+  return genTestImage(max_side)(rc::Random(seed), rc::kNominalSize).value();
+}
+
+TEST(GenImage, EveryKindIsDrawnAndFits) {
+  std::set<Fill> fills;
+  std::set<std::tuple<int, PixelType, bool>> types;
+  std::set<int> widths, heights;
+  int tiny = 0;
+  for (uint64_t seed = 0; seed < 2000; ++seed) {
+    const TestImage image = draw(seed, 64);
+    fills.insert(image.fill);
+    types.insert({image.channels, image.type, image.bgr});
+    widths.insert(image.width);
+    heights.insert(image.height);
+    tiny += image.width < 8 && image.height < 8 ? 1 : 0;
+    const ptrdiff_t size = image.type == PixelType::kU8 ? 1 : image.type == PixelType::kU16 ? 2 : 4;
+    EXPECT_GE(image.stride_bytes, size * image.channels * image.width);
+    EXPECT_EQ(image.stride_bytes % size, 0);
+    EXPECT_EQ(image.bytes.size(), static_cast<size_t>(image.stride_bytes * image.height));
+  }
+  EXPECT_EQ(fills.size(), static_cast<size_t>(kFillCount));
+  EXPECT_EQ(types.size(), 3U * 3U * 2U);
+  EXPECT_EQ(widths.size(), 64U);  // 1 and 64 included.
+  EXPECT_EQ(heights.size(), 64U);
+  EXPECT_GE(tiny, 20);
+}
+
+TEST(GenImage, ShrinksToOneGreyPixel) {
+  rc::Shrinkable<TestImage> image = genTestImage(64)(rc::Random(5), rc::kNominalSize);
+  for (int steps = 0; steps < 10000; ++steps) {
+    auto next = image.shrinks().next();
+    if (!next) break;
+    image = *next;
+  }
+  const TestImage smallest = image.value();
+  EXPECT_EQ(smallest.width, 1);
+  EXPECT_EQ(smallest.height, 1);
+  EXPECT_EQ(smallest.channels, 1);
+  EXPECT_EQ(smallest.fill, Fill::kConstant);
+  EXPECT_EQ(smallest.type, PixelType::kU8);
+}
+
+TEST(GenImage, FillsAreWhatTheySay) {
+  constexpr int kWidth = 200, kHeight = 120;
+  for (int f = 0; f < kFillCount; ++f) {
+    const auto fill = static_cast<Fill>(f);
+    for (uint64_t seed = 0; seed < 20; ++seed) {
+      const std::vector<float> grey = filled(fill, kWidth, kHeight, seed, 20, 1);
+      ASSERT_EQ(grey.size(), static_cast<size_t>(kWidth) * kHeight);
+      EXPECT_EQ(grey, filled(fill, kWidth, kHeight, seed, 20, 1)) << nameOf(fill);
+      double sum = 0, squares = 0;
+      for (const float value : grey) {
+        ASSERT_TRUE(value >= 0 && value <= 255) << nameOf(fill);
+        sum += static_cast<double>(value);
+        squares += static_cast<double>(value) * static_cast<double>(value);
+      }
+      const double n = static_cast<double>(grey.size()), mean = sum / n;
+      const double sigma = std::sqrt(std::max(0.0, squares / n - mean * mean));
+      if (fill == Fill::kConstant) {
+        EXPECT_LE(sigma, 1e-3);
+      }
+      if (fill == Fill::kWhiteNoise) {
+        EXPECT_NEAR(sigma, 20, 1);
+      }
+      // A Gaussian of 1 px leaves 1 / (2 sqrt(pi)) of the standard deviation.
+      if (fill == Fill::kBlurredNoise) {
+        EXPECT_NEAR(sigma, 20 * 0.2821, 0.6);
+      }
+    }
+  }
+}
+
+TEST(GenImage, PartsAndScaledCamerasSeeTheSame) {
+  const auto same = [](const std::optional<Eigen::Vector3d>& a,
+                       const std::optional<Eigen::Vector3d>& b) {
+    return a.has_value() == b.has_value() && (!a || (*a - *b).norm() <= 1e-9);
+  };
+  rc::check([&] {
+    const Camera camera = *genAnyCamera(Range::kRealistic);
+    const Eigen::Vector2d pixel = *genPixelInImage(camera);
+    const int left = *genInt(0, 50), top = *genInt(0, 50);
+    RC_ASSERT(same(
+        camera.unproject(pixel),
+        croppedCamera(camera, left, top, 100, 80).unproject({pixel.x() - left, pixel.y() - top})));
+    const double factor = *genReal(0.25, 2);
+    RC_ASSERT(
+        same(camera.unproject(pixel),
+             scaledCamera(camera, factor, 100, 80)
+                 .unproject({(pixel.x() + 0.5) * factor - 0.5, (pixel.y() + 0.5) * factor - 0.5})));
+  }) ||
+      (ADD_FAILURE(), true);
+  for (const std::string_view model : cameraModelNames()) {
+    for (uint64_t seed = 0; seed < 50; ++seed) {
+      const Camera camera = genSmallCamera(model, 300)(rc::Random(seed), 100).value();
+      EXPECT_LE(std::max(camera.width(), camera.height()), 300);
+      EXPECT_GE(std::max(camera.width(), camera.height()), 100);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace dlsd
