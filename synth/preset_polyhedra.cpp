@@ -113,8 +113,7 @@ SceneView makePolyhedra(uint64_t seed, uint64_t index) {
   for (Panel& wall : walls) wall.surface = {sky * random.next(0.8, 1.2), 0};
   builder.addRoom(hall, walls, {random.next(0.1, 0.6), 0}, {sky * random.next(0.8, 1.2), 0});
 
-  const Vector3d eye = roundToFloat(
-      hall / 2 + Vector3d{random.next(-0.4, 0.4), random.next(-0.4, 0.4), random.next(-0.4, 0.4)});
+  const Vector3d eye = drawEyeNear(hall / 2, &random);
   std::vector<Cone> cones;
   constexpr int kTries = 60;
   for (int k = 0; k < kTries; ++k) {
@@ -148,22 +147,7 @@ SceneView makePolyhedra(uint64_t seed, uint64_t index) {
     }
     builder.addSolid(frame, shape.vertices, shape.loops, surfaces);
   }
-  builder.finish();
-
-  Scene& scene = builder.scene;
-  scene.ambient_up = random.next(0.6, 0.8);
-  scene.ambient_down = random.next(0.35, 0.55);
-  Light sun;
-  sun.place = drawDirection(&random);
-  sun.place.z() = std::abs(sun.place.z());
-  sun.strength = random.next(0.4, 0.8);
-  scene.lights.push_back(sun);
-
-  SceneView view;
-  view.pose.position_in_world = eye;
-  view.pose.cam_from_world = drawRotation(&random);
-  view.scene = std::move(scene);
-  return view;
+  return viewUnderSun(&builder, eye, {0.35, 0.55}, {0.4, 0.8}, &random);
 }
 
 }  // namespace dlsd

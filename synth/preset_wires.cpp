@@ -74,8 +74,7 @@ SceneView makeWires(uint64_t seed, uint64_t index) {
   for (Panel& panel : walls) panel.surface = {wall * random.next(0.8, 1.1), 0};
   builder.addRoom(hall, walls, {wall * random.next(0.6, 1), 0}, {wall * random.next(0.8, 1.1), 0});
 
-  const Vector3d eye = roundToFloat(
-      hall / 2 + Vector3d{random.next(-0.4, 0.4), random.next(-0.4, 0.4), random.next(-0.4, 0.4)});
+  const Vector3d eye = drawEyeNear(hall / 2, &random);
   std::vector<Ball> balls;
   constexpr int kTries = 40;
   for (int k = 0; k < kTries; ++k) {
@@ -99,22 +98,7 @@ SceneView makeWires(uint64_t seed, uint64_t index) {
     const double albedo = dark_hall ? own.next(0.4, 0.95) : own.next(0.02, 0.25);
     builder.addJointedRods(wires.nodes, wires.links, radius, {albedo, 0});
   }
-  builder.finish();
-
-  Scene& scene = builder.scene;
-  scene.ambient_up = random.next(0.6, 0.8);
-  scene.ambient_down = random.next(0.4, 0.6);
-  Light sun;
-  sun.place = drawDirection(&random);
-  sun.place.z() = std::abs(sun.place.z());
-  sun.strength = random.next(0.3, 0.6);
-  scene.lights.push_back(sun);
-
-  SceneView view;
-  view.pose.position_in_world = eye;
-  view.pose.cam_from_world = drawRotation(&random);
-  view.scene = std::move(scene);
-  return view;
+  return viewUnderSun(&builder, eye, {0.4, 0.6}, {0.3, 0.6}, &random);
 }
 
 }  // namespace dlsd

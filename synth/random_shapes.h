@@ -3,8 +3,10 @@
 
 #include <Eigen/Geometry>
 #include <cmath>
+#include <utility>
 
 #include "synth/dataset/random.h"
+#include "synth/scene.h"
 #include "synth/scene_builder.h"
 
 namespace dlsd {
@@ -19,6 +21,40 @@ namespace dlsd {
 /// By any angle about any axis.
 [[nodiscard]] inline Eigen::Matrix3d drawRotation(Random* random) {
   return Eigen::AngleAxisd(random->next(0, 2 * M_PI), drawDirection(random)).toRotationMatrix();
+}
+
+/// A viewpoint within 0.4 m of a place, along each axis.
+[[nodiscard]] inline Eigen::Vector3d drawEyeNear(const Eigen::Vector3d& place, Random* random) {
+  return roundToFloat(place + Eigen::Vector3d{random->next(-0.4, 0.4),
+                                              random->next(-0.4, 0.4),
+                                              random->next(-0.4, 0.4)});
+}
+
+struct Bounds {
+  double lo, hi;
+};
+
+/// The scene in the open, under the sky and a sun, seen from `eye` in any direction.
+[[nodiscard]] inline SceneView viewUnderSun(SceneBuilder* builder,
+                                            const Eigen::Vector3d& eye,
+                                            const Bounds& ambient_down,
+                                            const Bounds& sun_strength,
+                                            Random* random) {
+  builder->finish();
+  Scene& scene = builder->scene;
+  scene.ambient_up = random->next(0.6, 0.8);
+  scene.ambient_down = random->next(ambient_down.lo, ambient_down.hi);
+  Light sun;
+  sun.place = drawDirection(random);
+  sun.place.z() = std::abs(sun.place.z());
+  sun.strength = random->next(sun_strength.lo, sun_strength.hi);
+  scene.lights.push_back(sun);
+
+  SceneView view;
+  view.pose.position_in_world = eye;
+  view.pose.cam_from_world = drawRotation(random);
+  view.scene = std::move(scene);
+  return view;
 }
 
 }  // namespace dlsd
