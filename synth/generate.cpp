@@ -381,31 +381,45 @@ std::vector<std::string> frameFolders(const GenerateOptions& options) {
   return folders;
 }
 
-/// Removes what a killed run left half written of this shard's frames.
-void removeTemporaryFiles(const GenerateOptions& options) {
-  for (const std::string& folder : frameFolders(options)) {
-    std::error_code error;
-    std::vector<fs::path> leftovers;
-    for (const auto& entry : fs::directory_iterator(options.out + "/" + folder, error)) {
-      const std::string name = entry.path().filename().string();
-      const size_t digits = name.find_first_not_of("0123456789");
-      if (digits == 0 || digits > 9 || name.find(".tmp-") == std::string::npos) continue;
-      if (std::stoi(name.substr(0, digits)) % options.shard_count == options.shard_index) {
-        leftovers.push_back(entry.path());
-      }
-    }
-    for (const fs::path& path : leftovers) fs::remove(path, error);
+/// Removes the temporary files that killed runs left in a folder of files with such names.
+template <typename IsOurs>
+void removeTemporaryFiles(const fs::path& folder, const IsOurs& is_ours) {
+  std::error_code error;
+  std::vector<fs::path> leftovers;
+  for (const auto& entry : fs::directory_iterator(folder, error)) {
+    const std::string name = entry.path().filename().string();
+    const size_t end = name.find(".tmp-");
+    if (end != std::string::npos && is_ours(name.substr(0, end))) leftovers.push_back(entry.path());
   }
+  for (const fs::path& path : leftovers) fs::remove(path, error);
 }
 
-/// The dataset is complete: no journal is needed any more, whoever wrote it.
-void removeJournals(const std::string& folder) {
+/// Of this shard only: others may be running.
+void removeTemporaryFilesOfShard(const GenerateOptions& options) {
+  for (const std::string& folder : frameFolders(options)) {
+    removeTemporaryFiles(fs::path(options.out) / folder, [&](const std::string& name) {
+      const size_t digits = name.find_first_not_of("0123456789");
+      return digits > 0 && digits <= 9 &&
+             std::stoi(name.substr(0, digits)) % options.shard_count == options.shard_index;
+    });
+  }
+  removeTemporaryFiles(options.out, [&](const std::string& name) {
+    return name == manifestName(options.shard_index, options.shard_count) ||
+           name == journalName(options.shard_index, options.shard_count);
+  });
+}
+
+/// The dataset is complete: no journal is needed any more, whoever wrote it, nor does any run
+/// write a camera's file.
+void removeLeftovers(const std::string& folder) {
   std::error_code error;
   std::vector<fs::path> journals;
   for (const auto& entry : fs::directory_iterator(folder, error)) {
     if (isJournal(entry.path().filename().string())) journals.push_back(entry.path());
   }
   for (const fs::path& path : journals) fs::remove(path, error);
+  removeTemporaryFiles(folder, isJournal);
+  removeTemporaryFiles(fs::path(folder) / "cameras", [](const std::string&) { return true; });
 }
 
 }  // namespace
@@ -459,7 +473,7 @@ GenerateResult generateDataset(const GenerateOptions& options,
   Manifest manifest{config, options.planes, {}, {}};
   makeFolders(options.out + "/cameras");
   for (const std::string& folder : frameFolders(options)) makeFolders(options.out + "/" + folder);
-  removeTemporaryFiles(options);
+  removeTemporaryFilesOfShard(options);
   for (const auto& [name, camera] : options.cameras) {
     const std::string text = kalibrYaml({{"cam0", camera}});
     const std::string path = options.out + "/" + cameraPath(name);
@@ -526,7 +540,7 @@ GenerateResult generateDataset(const GenerateOptions& options,
   if (!fileHas(own_path, sha256Hex(own_text))) writeFileAtomically(own_path, own_text);
   journal.remove();
   if (options.shard_count == 1) {
-    removeJournals(options.out);
+    removeLeftovers(options.out);
     return result;
   }
 
@@ -542,7 +556,7 @@ GenerateResult generateDataset(const GenerateOptions& options,
     return a.first < b.first;
   });
   writeFileAtomically(options.out + "/manifest.json", merged.text());
-  removeJournals(options.out);
+  removeLeftovers(options.out);
   return result;
 }
 
