@@ -148,8 +148,11 @@ struct Ocam {
   }
 
   [[nodiscard]] ProjectionJacobian jacobian(double x, double y, double z) const {
-    const double r = std::sqrt(x * x + y * y);  // 0 where project takes its limit, too.
-    const double rho = sensorRadius<double>(r, z).rho;
+    using W = Wider<double>;
+    const W across = std::sqrt(W(x) * W(x) + W(y) * W(y));
+    const double r = static_cast<double>(across);  // 0 where project takes its limit, too.
+    const auto [solved, found] = sensorRadius<double>(across, z);
+    const double rho = found ? solved : std::numeric_limits<double>::quiet_NaN();
     const double value = forward(rho).value;
     // value - rho slope; its terms without a1, which cancels.
     double turning = 0;

@@ -46,6 +46,30 @@ TEST(Ocam, TheFieldAngleRisesToTheEndOfTheDomain) {
   EXPECT_NEAR(withPolynomial({-2, -1, 0, 0, 0, 0, 0, 0, 0}).maxFieldAngle(), M_PI / 4, 1e-15);
 }
 
+// However near the fold, where the solve of a radius has little to hold on to.
+TEST(Ocam, TheJacobianIsThatOfTheAnswerUpToTheFold) {
+  int answers = 0;
+  for (const double shape : {-1.0, -0.3, -0.07, -0.011}) {
+    const Ocam m = withPolynomial({-200, 0, 1e-3 * shape, 1e-6 * shape, 0, 0, 0, 0, 0});
+    for (int k = -400; k <= 400; ++k) {
+      const double theta = m.max_theta * (1 + k * 0x1p-54);
+      for (const double scale : {1.0, 0.7}) {
+        const double r = scale * std::sin(theta), z = scale * std::cos(theta);
+        const double x = 0.8 * r, y = 0.6 * r;
+        const auto pixel = m.project(x, y, z);
+        if (!pixel.valid) continue;
+        ++answers;
+        // Along the circle the image moves by rho / r, whatever the fold does across it.
+        const double rho = std::hypot(pixel.u, pixel.v);
+        EXPECT_LE(std::abs((m.jacobian(x, y, z) * Eigen::Vector3d(-0.6, 0.8, 0)).norm() - rho / r),
+                  1e-4 * rho / r)
+            << k;
+      }
+    }
+  }
+  EXPECT_GE(answers, 2000);
+}
+
 TEST(Ocam, SparseCoefficientsAreInvertedToTheLastBits) {
   int tried = 0;
   for (const std::array<double, 9>& a : {std::array<double, 9>{-200, 0, 1e-3, 0, 0, 0, 0, 0, 0},

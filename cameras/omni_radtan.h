@@ -1,6 +1,7 @@
 #pragma once
 #include "cameras/camera_model.h"
 #include "cameras/radtan.h"
+#include "cameras/unified_sphere.h"
 
 namespace dlsd {
 
@@ -11,9 +12,9 @@ namespace dlsd {
 ///   d = |(x, y, z)|,  (mx, my) = D((x, y) / (z + xi d)),  D as in radtan.h with k3 = 0
 ///   u = fx mx + skew my + cx,  v = fy my + cy
 ///
-/// Domain: that of UnifiedOmni and, in the plane of m, the disc of radius max_radius on which D is
-/// one-to-one and which ends at the fold of the sphere, 1 / sqrt(xi^2 - 1), for xi > 1. Pixels: the
-/// image of that disc.
+/// Domain: that of UnifiedSphere and, in the plane of m, the disc of radius max_radius on which D
+/// is one-to-one and which ends at the fold of the sphere, 1 / sqrt(xi^2 - 1), for xi > 1. Pixels:
+/// the image of that disc.
 struct OmniRadtan {
   static constexpr std::string_view kName = "omni_radtan";
   static constexpr std::array<ParamSpec, 10> kParams{{
@@ -37,14 +38,13 @@ struct OmniRadtan {
 
   [[nodiscard]] static OmniRadtan fromParams(const std::array<double, 10>& p) {
     OmniRadtan m{p[0], p[1], p[2], p[3], p[4], Radtan::make(p[5], p[6], p[7], p[8], 0), p[9]};
-    const double sine2 = std::abs((m.xi - 1) * (m.xi + 1));
-    const double fold = m.xi > 1 ? 1 / std::sqrt(sine2) : Radtan::kUnbounded;
+    const double fold = m.xi > 1 ? 1 / std::sqrt((m.xi - 1) * (m.xi + 1)) : Radtan::kUnbounded;
     if (fold <= m.radtan.max_radius) {
       m.max_radius = fold;
-      m.max_theta = std::atan2(std::sqrt(sine2), m.xi > 1 ? -1 : -m.xi);
+      m.max_theta = m.sphere().maxFieldAngle();
     } else {
       m.max_radius = m.radtan.max_radius;
-      const auto ray = m.liftToSphere(m.max_radius, 0.0);
+      const auto ray = m.sphere().toRay(m.max_radius, 0.0);
       m.max_theta = std::atan2(ray.x, ray.z);
     }
     return m;
@@ -86,53 +86,31 @@ struct OmniRadtan {
     const T my = (v - T(cy)) * (T(1) / T(fy));
     const T mx = (u - T(cx) - T(skew) * my) * (T(1) / T(fx));
     const auto& p = radtan.attemptUndistort(mx, my, max_radius);
-    const auto& ray = liftToSphere(p.x, p.y);
+    const auto& ray = sphere().toRay(p.x, p.y);
     return {{ray.x, ray.y, ray.z, allOf(p.valid, pixelInRange(u, v))}, p.settled};
   }
 
   [[nodiscard]] ProjectionJacobian jacobian(double x, double y, double z) const {
-    const double r2 = x * x + y * y;
-    const double d = std::sqrt(r2 + z * z);
-    const auto [numerator, denominator] = inverseDepth(r2, z, d);
-    const double s = numerator / denominator;
-    const double slope = z >= 0 ? d + xi * z : (r2 - (xi - 1) * (xi + 1) * z * z) / (d - xi * z);
-    const double g = slope / d * (s * s);
-    const ProjectionJacobian plane = radialJacobian(1, 1, x, y, s, z * g, -std::sqrt(r2) * g);
+    const auto [plane, s] = sphere().derivative(1, 1, x, y, z);
     Eigen::Matrix2d A;
     A << fx, skew, 0, fy;
     const ProjectionJacobian J = A * (radtan.jacobian(x * s, y * s) * plane);
     // Euler: J ray = 0, which the product keeps only to rounding of its largest factor.
     const Eigen::RowVector3d ray(x, y, z);
-    return J - (J * ray.transpose()) * (ray / (d * d));
+    return J - (J * ray.transpose()) * (ray / ray.squaredNorm());
   }
 
   [[nodiscard]] double maxFieldAngle() const { return max_theta; }
 
  private:
-  template <class T>
-  struct Quotient {
-    T numerator, denominator;
-  };
-  /// 1 / (z + xi d), behind the camera without cancellation (UnifiedOmni).
-  template <class T>
-  [[nodiscard, gnu::always_inline]] Quotient<T> inverseDepth(T r2, T z, T d) const {
-    const bool front = z >= T(0);
-    const T behind = T(xi * xi) * r2 + T((xi - 1) * (xi + 1)) * (z * z);
-    return {select(front, T(1), T(xi) * d - z), select(front, z + T(xi) * d, behind)};
-  }
+  [[nodiscard, gnu::always_inline]] UnifiedSphere sphere() const { return {xi}; }
 
   /// (x, y) / (z + xi d).
   template <class T>
   [[nodiscard, gnu::always_inline]] PlanePoint<T> toPlane(T x, T y, T z) const {
-    const T r2 = x * x + y * y;
-    const auto [numerator, denominator] = inverseDepth(r2, z, std::sqrt(r2 + z * z));
-    const T scale = numerator / denominator;
+    const auto [scale, valid] = sphere().toPlane(x * x + y * y, z);
     const T nx = x * scale, ny = y * scale;
-    return {nx,
-            ny,
-            allOf(anyOf(z >= T(0), xi <= 1, r2 > T((xi - 1) * (xi + 1)) * (z * z)),
-                  denominator > T(0),
-                  std::sqrt(nx * nx + ny * ny) < T(radtan.max_radius))};
+    return {nx, ny, allOf(valid, std::sqrt(nx * nx + ny * ny) < T(radtan.max_radius))};
   }
 
   template <class T>
@@ -151,22 +129,11 @@ struct OmniRadtan {
     const W my = (W(v) - W(cy)) / W(fy);
     const W mx = (W(u) - W(cx) - W(skew) * my) / W(fx);
     const auto [x, y, valid] = radtan.undistort<T>(mx, my, max_radius);
-    const auto ray = liftToSphere(x, y);
+    const auto ray = sphere().toRay(x, y);
     return {static_cast<T>(ray.x),
             static_cast<T>(ray.y),
             static_cast<T>(ray.z),
             valid && pixelInRange(u, v)};
-  }
-
-  /// The unit ray of an undistorted point of the plane, up to the fold.
-  template <class T>
-  [[nodiscard, gnu::always_inline]] Ray<T> liftToSphere(T x, T y) const {
-    const T m2 = x * x + y * y;
-    const T disc = T(1) + T((1 - xi) * (1 + xi)) * m2;
-    const T root = std::sqrt(std::max(disc, T(0)));
-    const T inverse = T(1) / (T(1) + m2);
-    const T scale = (T(xi) + root) * inverse;
-    return {x * scale, y * scale, (root - T(xi) * m2) * inverse, true};
   }
 };
 static_assert(CameraModel<OmniRadtan>);
