@@ -2,12 +2,11 @@
 
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
-#include <algorithm>
 #include <memory>
 
 #include "cameras/calibration/files.h"
 #include "cli/command.h"
-#include "properties/checks/counterexample.h"
+#include "properties/checks/judge.h"
 #include "synth/dataset/json_fields.h"
 
 namespace dlsd::cli {
@@ -18,37 +17,16 @@ struct Options {
 };
 
 int replay(const Options& options) {
-  const FrameCase frame_case =
-      frameCaseFromJson(parseJson(readFile(options.path), options.path), options.path);
-  if (frame_case.property != "recovery") {
-    throw InputError(fmt::format("{}: property = \"{}\" is unknown: allowed is recovery",
-                                 options.path,
-                                 frame_case.property));
-  }
-  const Frame frame = renderCase(frame_case);
-  const RecoveryOutcome outcome = checkRecovery(frame_case, frame, {});
+  const auto json = parseJson(readFile(options.path), options.path);
+  const Verdict verdict = judgeCase(json, options.path, !options.out.empty());
   if (!options.out.empty()) {
-    print(saveCounterexample(options.out, frame_case, frame, outcome) + "\n");
+    print(saveCounterexample(options.out, verdict.judged, verdict.failure, verdict.shown) + "\n");
   }
-  for (const LabelLine& label : frame.labels.lines) {
-    if (std::count(outcome.missed_ids.begin(), outcome.missed_ids.end(), label.id) == 0) continue;
-    print(
-        fmt::format("missed: label {}, {} of {:.0f} grey levels, {:.0f} px, ({:.1f}, {:.1f}) to "
-                    "({:.1f}, {:.1f})\n",
-                    label.id,
-                    toString(label.kind),
-                    label.contrast,
-                    label.length_px,
-                    label.points.front().x(),
-                    label.points.front().y(),
-                    label.points.back().x(),
-                    label.points.back().y()));
-  }
-  print(fmt::format("{}: {}/{} clear labels found\n",
-                    outcome.missed_ids.empty() ? "passed" : "failed",
-                    outcome.found(),
-                    outcome.qualified));
-  return outcome.missed_ids.empty() ? kDone : kCheckFailed;
+  for (const std::string& detail : verdict.details) print(detail + "\n");
+  print(fmt::format("{}: {}\n",
+                    verdict.failure.empty() ? "passed" : "failed",
+                    verdict.failure.empty() ? verdict.summary : verdict.failure));
+  return verdict.failure.empty() ? kDone : kCheckFailed;
 }
 
 }  // namespace
@@ -62,9 +40,8 @@ Run addReplay(CLI::App& command) {
   command.footer(
       "Examples:\n"
       "  dlsd replay fixtures/counterexamples/x.json\n"
-      "  dlsd replay case.json --out look      then open overlay.svg: missed labels are "
-      "red\n\n"
-      "Exit code 1 if the case still fails.");
+      "  dlsd replay case.json --out look      then open overlay.svg: what fails is red\n\n"
+      "docs/properties.md explains the properties. Exit code 1 if the case still fails.");
   return [options] { return replay(*options); };
 }
 

@@ -12,7 +12,7 @@ namespace dlsd {
 namespace {
 
 TestImage draw(uint64_t seed, int max_side) {
-  return genTestImage(max_side)(rc::Random(seed), rc::kNominalSize).value();
+  return makeTestImage(genTestImage(max_side)(rc::Random(seed), rc::kNominalSize).value());
 }
 
 TEST(GenImage, EveryKindIsDrawnAndFits) {
@@ -40,13 +40,13 @@ TEST(GenImage, EveryKindIsDrawnAndFits) {
 }
 
 TEST(GenImage, ShrinksToOneGreyPixel) {
-  rc::Shrinkable<TestImage> image = genTestImage(64)(rc::Random(5), rc::kNominalSize);
+  rc::Shrinkable<TestImageSpec> image = genTestImage(64)(rc::Random(5), rc::kNominalSize);
   for (int steps = 0; steps < 10000; ++steps) {
     auto next = image.shrinks().next();
     if (!next) break;
     image = *next;
   }
-  const TestImage smallest = image.value();
+  const TestImageSpec smallest = image.value();
   EXPECT_EQ(smallest.width, 1);
   EXPECT_EQ(smallest.height, 1);
   EXPECT_EQ(smallest.channels, 1);

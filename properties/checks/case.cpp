@@ -5,10 +5,8 @@
 #include <stdexcept>
 
 #include "cameras/calibration/files.h"
-#include "synth/dataset/json_fields.h"
 
 namespace dlsd {
-namespace {
 
 using nlohmann::ordered_json;
 
@@ -42,8 +40,6 @@ Camera cameraFromJson(const JsonField& json) {
   }
 }
 
-}  // namespace
-
 ordered_json toJson(const FrameCase& frame_case) {
   return {{"format", "dlsd-case/1"},
           {"property", frame_case.property},
@@ -52,19 +48,29 @@ ordered_json toJson(const FrameCase& frame_case) {
           {"seed", frame_case.seed},
           {"index", frame_case.index},
           {"sensor", toJson(frame_case.sensor)},
+          {"distractors", {frame_case.variety.distractors.lo, frame_case.variety.distractors.hi}},
           {"detector", frame_case.detector}};
 }
 
 FrameCase frameCaseFromJson(const nlohmann::json& json, const std::string& source) {
   const JsonField root(json, source);
   if (root["format"].text() != "dlsd-case/1") root["format"].fail("is not dlsd-case/1");
-  return {root["property"].text(),
-          cameraFromJson(root["camera"]),
-          root["scene"].text(),
-          root["seed"].counter(),
-          root["index"].counter(),
-          sensorFromJson(root["sensor"].raw(), source),
-          root["detector"].text()};
+  FrameCase frame_case{.property = root["property"].text(),
+                       .camera = cameraFromJson(root["camera"]),
+                       .scene = root["scene"].text(),
+                       .seed = root["seed"].counter(),
+                       .index = root["index"].counter(),
+                       .sensor = sensorFromJson(root["sensor"].raw(), source),
+                       .variety = {},
+                       .detector = root["detector"].text()};
+  if (frame_case.property != "recovery" && frame_case.property != "soundness") {
+    root["property"].fail("is unknown for a scene: allowed is recovery, soundness");
+  }
+  if (root.has("distractors")) {  // Cases of the first version have none.
+    const std::vector<JsonField> range = root["distractors"].array(2, 2);
+    frame_case.variety.distractors = {range[0].number(), range[1].number()};
+  }
+  return frame_case;
 }
 
 Frame renderCase(const FrameCase& frame_case) {
@@ -73,6 +79,7 @@ Frame renderCase(const FrameCase& frame_case) {
   options.scene = frame_case.scene;
   options.seed = frame_case.seed;
   options.sensor = frame_case.sensor;
+  options.variety = frame_case.variety;
   return renderFrame(options, frame_case.index);
 }
 

@@ -7,18 +7,23 @@
 #include <string>
 
 #include "cameras/camera.h"
+#include "synth/dataset/json_fields.h"
 #include "synth/generate.h"
 
 namespace dlsd {
 
+[[nodiscard]] nlohmann::ordered_json cameraToJson(const Camera& camera);
+[[nodiscard]] Camera cameraFromJson(const JsonField& json);  ///< Throws InputError.
+
 /// What a property is checked on: a frame, made again bit for bit from these values, and the
 /// options of the detector by name.
 struct FrameCase {
-  std::string property;  ///< Which predicate judges it, e.g. "recovery".
+  std::string property;  ///< Which predicate judges it: "recovery" or "soundness".
   Camera camera;
   std::string scene = "room";  ///< Preset.
   uint64_t seed = 0, index = 0;
   SensorOptions sensor;
+  SceneVariety variety;
   std::string detector = "dlsd";  ///< One of builtinDetectors().
 };
 

@@ -3,61 +3,80 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <string_view>
 
 #include "cameras/calibration/files.h"
 #include "synth/dataset/dataset.h"
+#include "synth/scene.h"
 
 namespace dlsd {
 namespace {
 
-std::string svgCurve(const std::vector<Eigen::Vector2d>& points, const char* style) {
-  std::string text = "<polyline fill='none' ";
-  text += style;
-  text += " points='";
-  // SVG's origin is the corner of the first pixel, ours its centre.
-  for (const Eigen::Vector2d& p : points)
-    text += fmt::format("{:.2f},{:.2f} ", p.x() + 0.5, p.y() + 0.5);
-  text += "'/>\n";
+std::string svgCurves(const ShownPicture::Curves& curves, std::string_view style) {
+  std::string text;
+  for (const std::vector<Eigen::Vector2d>& points : curves) {
+    text += fmt::format("<polyline fill='none' {} points='", style);
+    // SVG's origin is the corner of the first pixel, ours its centre.
+    for (const Eigen::Vector2d& p : points) {
+      text += fmt::format("{:.2f},{:.2f} ", p.x() + 0.5, p.y() + 0.5);
+    }
+    text += "'/>\n";
+  }
   return text;
 }
 
-std::string overlaySvg(const Frame& frame, const RecoveryOutcome& outcome) {
-  const int w = frame.image.width, h = frame.image.height;
-  std::string svg = fmt::format(
-      "<svg xmlns='http://www.w3.org/2000/svg' width='{}' height='{}' viewBox='0 0 {} {}'>\n"
-      "<image href='image.png' width='{}' height='{}' style='image-rendering:pixelated'/>\n",
-      w,
-      h,
-      w,
-      h,
-      w,
-      h);
-  for (const LabelLine& label : frame.labels.lines) {
-    svg += svgCurve(label.points, "stroke='#4af' stroke-width='0.5'");
+std::string imageName(size_t i) {
+  return i == 0 ? "image.png" : fmt::format("image-{}.png", i + 1);
+}
+
+std::string overlaySvg(const std::vector<ShownPicture>& shown) {
+  constexpr int kGapPx = 8;
+  int width = 0, height = 0;
+  std::string body;
+  for (size_t i = 0; i < shown.size(); ++i) {
+    const ShownPicture& picture = shown[i];
+    body += fmt::format(
+        "<g transform='translate({} 0)'>\n<image href='{}' width='{}' height='{}' "
+        "style='image-rendering:pixelated'/>\n",
+        width,
+        imageName(i),
+        picture.image.width,
+        picture.image.height);
+    body += svgCurves(picture.labels, "stroke='#4af' stroke-width='0.5'");
+    body += svgCurves(picture.lines, "stroke='#2d2' stroke-width='1'");
+    body += svgCurves(picture.failed, "stroke='#f22' stroke-width='1.5'") + "</g>\n";
+    width += picture.image.width + kGapPx;
+    height = std::max(height, picture.image.height);
   }
-  for (const DetectionLine& line : outcome.detections) {
-    svg += svgCurve(line.points, "stroke='#2d2' stroke-width='1'");
-  }
-  for (const LabelLine& label : frame.labels.lines) {
-    if (std::count(outcome.missed_ids.begin(), outcome.missed_ids.end(), label.id) > 0) {
-      svg += svgCurve(label.points, "stroke='#f22' stroke-width='1.5'");
-    }
-  }
-  return svg + "</svg>\n";
+  return fmt::format(
+             "<svg xmlns='http://www.w3.org/2000/svg' width='{0}' height='{1}' viewBox='0 0 {0} "
+             "{1}'>\n",
+             width,
+             height) +
+         body + "</svg>\n";
 }
 
 }  // namespace
 
 std::string saveCounterexample(const std::string& parent,
-                               const FrameCase& frame_case,
-                               const Frame& frame,
-                               const RecoveryOutcome& outcome) {
-  const std::string text = toJson(frame_case).dump(1) + "\n";
-  const std::string folder = parent + "/counterexample-" + sha256Hex(text).substr(0, 12);
+                               const nlohmann::ordered_json& failing_case,
+                               const std::string& failure,
+                               const std::vector<ShownPicture>& shown) {
+  const std::string hash = sha256Hex(failing_case.dump()).substr(0, 12);
+  const std::string folder = parent + "/counterexample-" + hash;
+  nlohmann::ordered_json text = failing_case;
+  text["failure"] = failure;
+  text["replay"] = "dlsd replay case.json";
+  text["versions"] = {{"dlsd", DLSD_VERSION}, {"compiler", __VERSION__}};
+  if (text.contains("scene")) {
+    text["versions"]["scene"] = presetVersion(text["scene"].get<std::string>());
+  }
   makeFolders(folder);
-  writeFileAtomically(folder + "/case.json", text);
-  writeFileAtomically(folder + "/image.png", encodePng(frame.image));
-  writeFileAtomically(folder + "/overlay.svg", overlaySvg(frame, outcome));
+  writeFileAtomically(folder + "/case.json", text.dump(1) + "\n");
+  for (size_t i = 0; i < shown.size(); ++i) {
+    writeFileAtomically(folder + "/" + imageName(i), encodePng(shown[i].image));
+  }
+  writeFileAtomically(folder + "/overlay.svg", overlaySvg(shown));
   return folder;
 }
 

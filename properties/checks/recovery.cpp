@@ -46,6 +46,12 @@ bool runsAlongRim(const Camera& camera, const LabelLine& label, double clearance
 
 }  // namespace
 
+RecoveryCriteria recoveryCriteria(const FrameCase& frame_case) {
+  RecoveryCriteria criteria;
+  criteria.rho_px = frame_case.sensor.read_noise_levels > 0 ? 2 : 1;
+  return criteria;
+}
+
 RecoveryOutcome checkRecovery(const FrameCase& frame_case,
                               const Frame& frame,
                               const RecoveryCriteria& criteria) {
@@ -70,6 +76,17 @@ RecoveryOutcome checkRecovery(const FrameCase& frame_case,
     if (clear && !result.labels[0][i].found) outcome.missed_ids.push_back(frame.labels.lines[i].id);
   }
   return outcome;
+}
+
+ShownPicture shownOf(const Frame& frame, const RecoveryOutcome& outcome) {
+  ShownPicture shown{frame.image, {}, {}, {}};
+  for (const LabelLine& label : frame.labels.lines) {
+    const bool missed =
+        std::count(outcome.missed_ids.begin(), outcome.missed_ids.end(), label.id) > 0;
+    (missed ? shown.failed : shown.labels).push_back(label.points);
+  }
+  for (const DetectionLine& line : outcome.detections) shown.lines.push_back(line.points);
+  return shown;
 }
 
 }  // namespace dlsd

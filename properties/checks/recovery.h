@@ -7,6 +7,7 @@
 #include "detector/detector.h"
 #include "evaluation/evaluate.h"
 #include "properties/checks/case.h"
+#include "properties/checks/counterexample.h"
 
 namespace dlsd {
 
@@ -18,7 +19,7 @@ struct RecoveryCriteria {
   double min_angle_rad = 5 * M_PI / 180;
   double min_length_px = 40;
   double clearance_px = 12;
-  double rho_px = 4;
+  double rho_px = 1;
 };
 
 struct RecoveryOutcome {
@@ -29,9 +30,16 @@ struct RecoveryOutcome {
   [[nodiscard]] long found() const { return qualified - static_cast<long>(missed_ids.size()); }
 };
 
+/// What must be found in a case's frame: the labels above, within 1 px where the sensor adds no
+/// noise, within 2 px where it does.
+[[nodiscard]] RecoveryCriteria recoveryCriteria(const FrameCase& frame_case);
+
 /// Detects lines in the frame and looks for its labels among them.
 [[nodiscard]] RecoveryOutcome checkRecovery(const FrameCase& frame_case,
                                             const Frame& frame,
                                             const RecoveryCriteria& criteria);
+
+/// The frame with labels, detections and missed labels.
+[[nodiscard]] ShownPicture shownOf(const Frame& frame, const RecoveryOutcome& outcome);
 
 }  // namespace dlsd

@@ -1,0 +1,82 @@
+#include "properties/checks/judge.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "properties/checks/picture.h"
+#include "properties/checks/recovery.h"
+#include "properties/checks/soundness.h"
+
+namespace dlsd {
+namespace {
+
+std::string pieceOf(const std::vector<Eigen::Vector2d>& points) {
+  return fmt::format("({:.1f}, {:.1f}) to ({:.1f}, {:.1f})",
+                     points.front().x(),
+                     points.front().y(),
+                     points.back().x(),
+                     points.back().y());
+}
+
+void judgeRecovery(const FrameCase& frame_case, const Frame& frame, bool with_shown, Verdict* v) {
+  const RecoveryOutcome outcome = checkRecovery(frame_case, frame, recoveryCriteria(frame_case));
+  for (const LabelLine& label : frame.labels.lines) {
+    if (std::count(outcome.missed_ids.begin(), outcome.missed_ids.end(), label.id) == 0) continue;
+    v->details.push_back(fmt::format("missed: label {}, {} of {:.0f} grey levels, {:.0f} px, {}",
+                                     label.id,
+                                     toString(label.kind),
+                                     label.contrast,
+                                     label.length_px,
+                                     pieceOf(label.points)));
+  }
+  v->counted = outcome.qualified;
+  v->summary = fmt::format("{}/{} clear labels found", outcome.found(), outcome.qualified);
+  if (!outcome.missed_ids.empty()) v->failure = v->summary;
+  if (with_shown) v->shown = {shownOf(frame, outcome)};
+}
+
+void judgeSoundness(const FrameCase& frame_case, const Frame& frame, bool with_shown, Verdict* v) {
+  const SoundnessOutcome outcome = checkSoundness(frame_case, frame);
+  for (const int i : outcome.wrong) {
+    const DetectionLine& line = outcome.detections[static_cast<size_t>(i)];
+    v->details.push_back(fmt::format("on no label: {}", pieceOf(line.points)));
+  }
+  v->counted = static_cast<long>(outcome.detections.size());
+  v->summary = fmt::format("{}/{} detections on no label, the longest of {:.0f} px",
+                           outcome.wrong.size(),
+                           outcome.detections.size(),
+                           outcome.longest_wrong_px);
+  if (!(outcome.longest_wrong_px < kLongWrongPx)) v->failure = v->summary;
+  if (with_shown) v->shown = {shownOf(frame, outcome)};
+}
+
+}  // namespace
+
+Verdict judgeCase(const nlohmann::json& json, const std::string& source, bool with_shown) {
+  Verdict verdict;
+  if (json.is_object() && json.contains("scene")) {
+    const FrameCase frame_case = frameCaseFromJson(json, source);
+    const Frame frame = renderCase(frame_case);
+    verdict.judged = toJson(frame_case);
+    if (frame_case.property == "recovery") {
+      judgeRecovery(frame_case, frame, with_shown, &verdict);
+    } else {
+      judgeSoundness(frame_case, frame, with_shown, &verdict);
+    }
+    return verdict;
+  }
+  const PictureCase picture_case = pictureCaseFromJson(json, source);
+  PictureOutcome outcome = checkPicture(picture_case, with_shown);
+  verdict.judged = toJson(picture_case);
+  verdict.failure = outcome.failure;
+  verdict.counted = outcome.counted;
+  verdict.summary =
+      outcome.applies
+          ? fmt::format("{}, {} counted", nameOf(picture_case.property), outcome.counted)
+          : "the case says nothing about the property";
+  verdict.shown = std::move(outcome.shown);
+  return verdict;
+}
+
+}  // namespace dlsd

@@ -1,0 +1,28 @@
+#pragma once
+// Any saved case of any property: read, made again, judged.
+
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "properties/checks/counterexample.h"
+
+namespace dlsd {
+
+struct Verdict {
+  nlohmann::ordered_json judged;     ///< The case as it was understood.
+  std::string failure;               ///< Empty: the property holds. Else one line.
+  std::string summary;               ///< What was counted, one line.
+  std::vector<std::string> details;  ///< A line for each thing that fails, where several can.
+  /// Labels, pixels or lines of which the property speaks: 0 if the case says nothing about it.
+  long counted = 0;
+  std::vector<ShownPicture> shown;  ///< If asked for.
+};
+
+/// Judges the case by the property that it names. Throws InputError with source, key and value for
+/// anything missing, unknown or out of range.
+[[nodiscard]] Verdict judgeCase(const nlohmann::json& json,
+                                const std::string& source,
+                                bool with_shown);
+
+}  // namespace dlsd
