@@ -1,5 +1,6 @@
 #include "cameras/batch.h"
 
+#include <algorithm>
 #include <initializer_list>
 #include <stdexcept>
 
@@ -7,6 +8,7 @@
 #define DLSD_BATCH_TARGET
 #define DLSD_BATCH_FLAG float
 #include "cameras/batch_loops.h"
+#include "cameras/mutant.h"
 
 namespace dlsd {
 namespace batch {
@@ -69,6 +71,7 @@ void projectAll(const Camera& camera,
   requireSameSize(n, {y.size(), z.size(), u.size(), v.size(), valid.size()});
   buildFor(simd).in_double.project(
       camera, x.data(), y.data(), z.data(), u.data(), v.data(), valid.data(), n);
+  if (DLSD_MUTANT("invalid-batch-project")) std::fill(valid.begin(), valid.end(), uint8_t{0});
 }
 
 void projectAll(const Camera& camera,
@@ -97,6 +100,7 @@ void unprojectAll(const Camera& camera,
   requireSameSize(n, {v.size(), x.size(), y.size(), z.size(), valid.size()});
   buildFor(simd).in_double.unproject(
       camera, u.data(), v.data(), x.data(), y.data(), z.data(), valid.data(), n);
+  if (DLSD_MUTANT("invalid-batch-unproject")) std::fill(valid.begin(), valid.end(), uint8_t{0});
 }
 
 void unprojectAll(const Camera& camera,

@@ -5,6 +5,8 @@
 #include <stdexcept>
 #include <utility>
 
+#include "cameras/mutant.h"
+
 namespace dlsd {
 namespace {
 
@@ -129,7 +131,7 @@ std::optional<Eigen::Vector2d> Camera::project(const Eigen::Vector3d& ray_in_cam
   const Pixel<double> p = std::visit(
       [&](const auto& m) { return m.project(ray_in_cam.x(), ray_in_cam.y(), ray_in_cam.z()); },
       model_);
-  if (!p.valid) return std::nullopt;
+  if (!p.valid || DLSD_MUTANT("invalid-project")) return std::nullopt;
   if (max_field_angle_rad_ < M_PI &&
       !angle_limit_.admits(ray_in_cam.x(), ray_in_cam.y(), ray_in_cam.z())) {
     return std::nullopt;
@@ -140,7 +142,7 @@ std::optional<Eigen::Vector2d> Camera::project(const Eigen::Vector3d& ray_in_cam
 std::optional<Eigen::Vector3d> Camera::unproject(const Eigen::Vector2d& pixel) const {
   const Ray<double> r =
       std::visit([&](const auto& m) { return m.unproject(pixel.x(), pixel.y()); }, model_);
-  if (!r.valid) return std::nullopt;
+  if (!r.valid || DLSD_MUTANT("invalid-unproject")) return std::nullopt;
   const Eigen::Vector3d ray(r.x, r.y, r.z);
   if (max_field_angle_rad_ < M_PI && !angle_limit_.admits(r.x, r.y, r.z)) {
     return std::nullopt;
@@ -153,7 +155,7 @@ std::optional<ProjectionJacobian> Camera::jacobian(const Eigen::Vector3d& ray_in
   const ProjectionJacobian J = std::visit(
       [&](const auto& m) { return m.jacobian(ray_in_cam.x(), ray_in_cam.y(), ray_in_cam.z()); },
       model_);
-  return J.allFinite() ? std::optional(J) : std::nullopt;
+  return J.allFinite() && !DLSD_MUTANT("invalid-jacobian") ? std::optional(J) : std::nullopt;
 }
 
 double imageFieldAngle(const Camera& camera) {

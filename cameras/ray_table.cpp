@@ -82,7 +82,8 @@ RayTable::RayTable(const Camera& camera)
         const Eigen::Vector3d exact(probes.x[here], probes.y[here], probes.z[here]);
         const double err_px = (sample.ray - exact).norm() * sample.pxPerRad();
         const auto J = camera_.jacobian(exact);
-        smooth = J && (err_px * kSafety <= kMaxErrPx || DLSD_MUTANT("ray-table-smooth"));
+        smooth = !DLSD_MUTANT("invalid-ray-table") && J &&
+                 (err_px * kSafety <= kMaxErrPx || DLSD_MUTANT("ray-table-smooth"));
         if (!smooth) continue;
         Eigen::Matrix<double, 3, 2> D;
         D << sample.du, sample.dv;

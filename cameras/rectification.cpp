@@ -7,6 +7,7 @@
 #include <stdexcept>
 
 #include "cameras/batch.h"
+#include "cameras/mutant.h"
 
 namespace dlsd {
 namespace {
@@ -148,7 +149,7 @@ ViewMaps mapsOf(const Source& source, const VirtualView& view) {
       const std::optional<Vector2d> pixel = valid[i] != 0 ? source.shown(u[i], v[i]) : std::nullopt;
       if (!pixel) continue;
       const size_t at = row * width + i;
-      maps.u[at] = float(pixel->x());
+      maps.u[at] = float(pixel->x() + (DLSD_MUTANT("rectify-shift") ? 0.01 : 0));
       maps.v[at] = float(pixel->y());
       maps.valid[at] = 1;
     }

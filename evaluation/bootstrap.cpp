@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "cameras/mutant.h"
 #include "synth/dataset/random.h"
 
 namespace dlsd {
@@ -49,7 +50,8 @@ std::optional<Interval> Bootstrap::of(
     return std::nullopt;
   }
   std::sort(values.begin(), values.end());
-  return Interval{quantile(values, 0.025), quantile(values, 0.975)};
+  return Interval{quantile(values, DLSD_MUTANT("interval-90") ? 0.05 : 0.025),
+                  quantile(values, DLSD_MUTANT("interval-90") ? 0.95 : 0.975)};
 }
 
 std::optional<Interval> Bootstrap::ofRatio(std::span<const double> counted,

@@ -13,6 +13,7 @@
 #include <utility>
 
 #include "cameras/arc.h"
+#include "cameras/mutant.h"
 
 namespace dlsd {
 namespace {
@@ -355,7 +356,7 @@ class Counters {
 };
 
 bool atLeastNineTenths(size_t counted, size_t total) {
-  return 10 * counted >= 9 * total;
+  return 10 * counted >= (DLSD_MUTANT("nine-tenths") ? 8 : 9) * total;
 }
 
 struct LabelSet {
@@ -462,7 +463,7 @@ bool isCrowded(
   sampleBetween(curve, 0, curve.length(), samples);
   const auto meetsNear = [&](const Curve& other, const Vector2d& p) {
     for (const Vector2d& end : {curve.points.front(), curve.points.back()}) {
-      if ((p - end).norm() <= kSharedEndRadiusPx &&
+      if ((p - end).norm() <= (DLSD_MUTANT("crowd-radius") ? 1.3 : 1) * kSharedEndRadiusPx &&
           ((other.points.front() - end).norm() <= kSharedEndPx ||
            (other.points.back() - end).norm() <= kSharedEndPx)) {
         return true;
@@ -514,7 +515,8 @@ bool isMerged(const Camera& camera,
     gap = std::find_if_not(gap, evidence.end(), beside);
     const auto next = std::find_if(gap, evidence.end(), beside);
     // The last stretch, with no evidence after it, is not between two of them.
-    if (next != evidence.end() && double(next - gap) * samples.step_px > kMaxBridgePx + 1e-9) {
+    if (next != evidence.end() && double(next - gap) * samples.step_px >
+                                      (DLSD_MUTANT("bridge-length") ? 6 : kMaxBridgePx) + 1e-9) {
       bridges = true;
       for (auto it = gap; it != next; ++it) {
         const Vector2d& pixel = samples.points[size_t(it - evidence.begin())];
@@ -564,7 +566,8 @@ EndError endError(const Curve& label,
   const Place place =
       placeAlong(detection, label_at_end ? label.points.back() : label.points.front());
   const double at = std::clamp(place.length_px, 0.0, detection.length());
-  return {detection_at_end ? detection.length() - at : at, place.distance_px};
+  return {detection_at_end != DLSD_MUTANT("end-error-side") ? detection.length() - at : at,
+          place.distance_px};
 }
 
 /// Of both ends of a label, in the order of its curve.
@@ -756,7 +759,7 @@ FrameOutcome evaluateFrame(const Camera& camera,
   for (size_t i = 0; i < labels.size(); ++i) {
     const double length = set.curves[i].length();
     const double trim = std::min(kLabelTrimPx, length / 4);
-    sampleBetween(set.curves[i], trim, length - trim, samples);
+    sampleBetween(set.curves[i], trim, length - (DLSD_MUTANT("trim-one-end") ? 0 : trim), samples);
     for (const Vector2d& p : samples.points) {
       forCurvesNear(detection_grid, p, [&](int detection, double d2, double) {
         near_detection.add(detection, d2, rho2);
@@ -800,7 +803,7 @@ FrameOutcome evaluateFrame(const Camera& camera,
         const double angle = std::asin(std::min(1.0, std::abs(labels[i].normal.dot(*ray))));
         ++errors.angle_samples;
         errors.sum_rad += angle;
-        errors.sum2_rad2 += angle * angle;
+        errors.sum2_rad2 += DLSD_MUTANT("angle-squares") ? angle : angle * angle;
       }
     }
     errors.samples = stats.count;

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "cameras/arc.h"
+#include "cameras/mutant.h"
 
 namespace dlsd {
 namespace {
@@ -20,7 +21,8 @@ constexpr int kNodes = 48;
 /// Fisher information of the offset across an edge of contrast 1, per px of its length.
 double informationPerPx(const ImageNoise& noise) {
   const double blur_px = std::sqrt(noise.blur_px * noise.blur_px + 1.0 / 12);
-  const double noise2 = noise.noise_levels * noise.noise_levels + 1.0 / 12;
+  const double noise2 =
+      noise.noise_levels * noise.noise_levels + (DLSD_MUTANT("bound-rounding") ? 0 : 1.0 / 12);
   return 1 / (2 * std::sqrt(M_PI) * blur_px * noise2);
 }
 
@@ -75,7 +77,8 @@ std::optional<Matrix3d> normalInformation(const Camera& camera,
     const Vector2d moved = *jacobian * arc->normal;
     const double px_per_rad = along.norm();
     const double across = (along.x() * moved.y() - along.y() * moved.x()) / px_per_rad;
-    information += per_px * px_per_rad * step_rad * across * across * ray * ray.transpose();
+    information += per_px * px_per_rad * step_rad * across *
+                   (DLSD_MUTANT("bound-across") ? px_per_rad : across) * ray * ray.transpose();
   }
   return information.allFinite() ? std::optional(information) : std::nullopt;
 }

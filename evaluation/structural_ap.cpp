@@ -5,6 +5,7 @@
 #include <limits>
 #include <numeric>
 
+#include "cameras/mutant.h"
 #include "synth/dataset/statistics.h"
 
 namespace dlsd {
@@ -63,7 +64,8 @@ double structuralDistance(const StructuralCurve& a, const StructuralCurve& b, bo
     forward += (a[k] - b[k]).squaredNorm();
     reversed += (a[k] - b[kStructuralPoints - 1 - k]).squaredNorm();
   }
-  return std::min(forward, reversed) * (chord ? 1 : 2.0 / double(kStructuralPoints));
+  return (DLSD_MUTANT("ap-direction") ? forward : std::min(forward, reversed)) *
+         (chord ? 1 : 2.0 / double(kStructuralPoints));
 }
 
 StructuralOutcome matchStructure(const std::vector<StructuralCurve>& labels,
@@ -94,7 +96,7 @@ StructuralOutcome matchStructure(const std::vector<StructuralCurve>& labels,
       if (!(least < kStructuralThresholds[t])) {
         continue;
       }
-      if (!counts[nearest]) {
+      if (!counts[nearest] && !DLSD_MUTANT("ap-ignored")) {
         result.matches[t] = StructuralMatch::kIgnored;
       } else if (!taken[nearest][t]) {
         taken[nearest][t] = true;
@@ -145,7 +147,8 @@ double StructuralAp::averagePrecision(size_t threshold, std::span<const uint8_t>
   }
   double area = 0, envelope = 0;
   for (size_t i = steps.size(); i-- > 0;) {
-    envelope = std::max(envelope, steps[i].precision);
+    envelope =
+        DLSD_MUTANT("ap-envelope") ? steps[i].precision : std::max(envelope, steps[i].precision);
     area += steps[i].gained * envelope;
   }
   return area / double(total);

@@ -171,7 +171,7 @@ TEST_P(PictureSuite, ASceneTurnedAboutTheAxisHasTheTurnedLines) {
                              picture_case.amount = *genReal(0, 2 * M_PI);
                              return picture_case;
                            }),
-               0.5);
+               0);
 }
 
 TEST_P(PictureSuite, APartOfThePictureHasItsLines) {

@@ -9,8 +9,9 @@ cd "$(dirname "$0")/.."
 source scripts/packages.sh
 
 list=properties/mutants.tsv
-build=build/mutants
-export RC_PARAMS=${RC_PARAMS:-seed=1 max_success=200}
+export build=${DLSD_MUTANTS_BUILD:-build/mutants}
+# What fails need not be shrunk.
+export RC_PARAMS="${RC_PARAMS:-seed=1 max_success=200} noshrink=1" DLSD_SHRINK_SECONDS=0
 
 # Every defect in the sources is in the list, and the other way round.
 in_sources=$(grep -rhoE 'DLSD_MUTANT\("[a-z0-9-]+"\)' --include='*.h' --include='*.cpp' \
@@ -20,41 +21,56 @@ if ! diff <(echo "$in_sources") <(echo "$in_list") >&2; then
   echo "mutants.sh: the defects in the sources (<) and in $list (>) differ" >&2
   exit 2
 fi
+wanted=$(mktemp)
+scratch=$(mktemp -d)
+trap 'rm -rf "$wanted" "$scratch"' EXIT
+export scratch
+while IFS= read -r line; do
+  if [[ $# -eq 0 || " $* " == *" ${line%%$'\t'*} "* ]]; then printf '%s\n' "$line"; fi
+done < <(grep -v '^#' $list) >"$wanted"
 
 need_packages "${build_packages[@]}" "${test_packages[@]}"
-cmake -S . -B $build -G Ninja -DCMAKE_BUILD_TYPE=Release -DDLSD_TESTS=ON -DDLSD_MUTANTS=ON
-programs=$(grep -v '^#' $list | cut -f3 | sort -u)
-# shellcheck disable=SC2086
-cmake --build $build --target $programs
+cmake -S . -B "$build" -G Ninja -DCMAKE_BUILD_TYPE=Release -DDLSD_TESTS=ON -DDLSD_MUTANTS=ON
+# shellcheck disable=SC2046
+cmake --build "$build" --target $(cut -f3 "$wanted" | sort -u)
 
-declare -A passes  # Whether a test passes without a defect.
-caught=0 subtle=0 missed=()
-while IFS=$'\t' read -r name size program filter what; do
-  if [[ $# -gt 0 && " $* " != *" $name "* ]]; then continue; fi
-  path=$(find $build -name "$program" -type f -perm -u+x | head -1)
-  run() { DLSD_MUTANT=$1 timeout 600 "$path" --gtest_filter="$filter" 2>&1 || true; }
-  key=$program:$filter
-  if [[ -z ${passes[$key]:-} ]]; then
-    out=$(run "")
-    if grep -q '\[  PASSED  \] [1-9]' <<<"$out" && ! grep -q '\[  FAILED  \]' <<<"$out"; then
-      passes[$key]=yes
-    else
-      passes[$key]=no
-    fi
-  fi
-  if [[ ${passes[$key]} == no ]]; then
-    verdict="NO VERDICT, $filter does not pass without a defect"
-    missed+=("$name")
-  elif grep -q '\[  FAILED  \]' <<<"$(run "$name")"; then
-    verdict=caught
-    caught=$((caught + 1))
-    if [[ $size == subtle ]]; then subtle=$((subtle + 1)); fi
+# verdict MUTANT PROGRAM FILTER: prints passed, failed, or none where no test ran to its end. In a
+# folder of its own, for the counterexamples.
+verdict() {
+  local path out folder
+  path=$(realpath "$(find "$build" -name "$2" -type f -perm -u+x | head -1)")
+  folder=$(mktemp -d "$scratch/run.XXXXXX")
+  out=$(cd "$folder" && DLSD_MUTANT=$1 timeout 600 "$path" --gtest_filter="$3" 2>&1) || true
+  rm -rf "$folder"
+  if grep -q '\[  FAILED  \]' <<<"$out"; then
+    echo failed
+  elif grep -q '\[  PASSED  \] [1-9]' <<<"$out"; then
+    echo passed
   else
-    verdict=MISSED
-    missed+=("$name")
+    echo none
   fi
-  printf '%-26s %-7s %-10s %s: %s\n' "$name" "$size" "$verdict" "$program $filter" "$what"
-done < <(grep -v '^#' $list)
+}
 
-echo "$caught caught ($subtle of them subtle), ${#missed[@]} missed${missed[*]:+: ${missed[*]}}"
-[[ ${#missed[@]} -eq 0 && $caught -gt 0 ]]
+# judge "NAME<tab>SIZE<tab>PROGRAM<tab>FILTER<tab>WHAT": a line of the table.
+judge() {
+  local name size program filter what without with result
+  IFS=$'\t' read -r name size program filter what <<<"$1"
+  local known="$scratch/$(sha256sum <<<"$program $filter" | cut -c1-16)"
+  without=$(flock "$known.lock" bash -c '[[ -s $0 ]] || verdict "" "$1" "$2" >"$0"; cat "$0"' \
+    "$known" "$program" "$filter")
+  if [[ $without != passed ]]; then
+    result="NO VERDICT"
+  else
+    with=$(verdict "$name" "$program" "$filter")
+    result=$([[ $with == failed ]] && echo caught || echo MISSED)
+  fi
+  printf '%-26s %-7s %-10s %s: %s\n' "$name" "$size" "$result" "$program $filter" "$what"
+}
+export -f verdict judge
+
+table=$(tr '\n' '\0' <"$wanted" | xargs -0 -P "$(nproc)" -I{} bash -c 'judge "$0"' {} | tee /dev/stderr)
+caught=$(grep -cE '^[^ ]+ +[a-z]+ +caught ' <<<"$table" || true)
+subtle=$(grep -cE '^[^ ]+ +subtle +caught ' <<<"$table" || true)
+others=$(grep -vE '^[^ ]+ +[a-z]+ +caught ' <<<"$table" | cut -d' ' -f1 | tr '\n' ' ' || true)
+echo "$caught of $(wc -l <"$wanted") caught ($subtle of them subtle)${others:+; not caught: $others}"
+[[ -z $others && $caught -gt 0 ]]

@@ -8,6 +8,7 @@
 #include <optional>
 #include <set>
 
+#include "cameras/mutant.h"
 #include "synth/dataset/statistics.h"
 #include "synth/shadows.h"
 
@@ -128,7 +129,7 @@ class Events {
         const double at = std::atan2(y, x), half = std::acos(ratio);
         // Back into [-pi, pi], where the arc is [0, angle].
         addPhi(std::remainder(at - half, 2 * M_PI));
-        addPhi(std::remainder(at + half, 2 * M_PI));
+        if (!DLSD_MUTANT("label-sphere")) addPhi(std::remainder(at + half, 2 * M_PI));
       }
     }
     // Where the edge itself goes into the sphere (a rod into its node).
@@ -152,7 +153,7 @@ class Events {
     if (rest2 < 0) return;
     const Eigen::Vector3d along = normal.cross(across).normalized() * std::sqrt(rest2);
     addDirection(foot + along);
-    addDirection(foot - along);
+    if (!DLSD_MUTANT("label-disc")) addDirection(foot - along);
   }
 
   /// Sorted angles inside (lo, hi), with both ends.
@@ -216,7 +217,7 @@ class View {
     const double distance = d.norm();
     const Eigen::Vector3f direction = (d / distance).cast<float>();
     // Contact aside, nothing is nearer to an edge than about 1 mm: 1e-5 of the distance is less.
-    const auto end = static_cast<float>(distance * (1 - 1e-5));
+    const auto end = static_cast<float>(distance * (DLSD_MUTANT("label-hidden") ? 0.99 : 1 - 1e-5));
     float begin = 0;
     for (;;) {
       const Hit hit = raycaster_.cast(pose_.position_in_world.cast<float>(), direction, begin, end);
@@ -261,7 +262,8 @@ EndKind endKind(ImageEnd end) {
 
 /// To 1e-6 px, a thousandth of the labels' tolerance: files get half as long.
 double roundPixel(double x) {
-  return std::round(x * 1e6) / 1e6;
+  const double steps = DLSD_MUTANT("label-rounding") ? 10 : 1e6;
+  return std::round(x * steps) / steps;
 }
 
 /// Width in px of a rod at a fraction of its centre line; 0 outside the domain.
@@ -330,7 +332,7 @@ double shadowWidthPx(const Scene& scene,
 /// leave of the contrast in the middle of a stripe.
 double shareLeftByBlur(double width_px, double psf_sigma_px) {
   const double sigma = std::sqrt(psf_sigma_px * psf_sigma_px + 1.0 / 12);
-  return std::erf(width_px / (2 * std::sqrt(2.0) * sigma));
+  return std::erf(width_px / ((DLSD_MUTANT("label-stripe-blur") ? 1 : 2) * std::sqrt(2.0) * sigma));
 }
 
 /// Calls function(fraction of the edge) at kWidthPoints points of each imaged piece of an edge,
@@ -532,7 +534,9 @@ Labels makeLabels(const Scene& scene,
     int continuous = 0;
     line.contrast_min = std::numeric_limits<double>::infinity();
     for (int k = 0; k < kContrastPoints; ++k) {
-      const double phi = span.phi0 + line.angle_rad * (k + 0.5) / kContrastPoints;
+      const double phi = span.phi0 + line.angle_rad *
+                                         (DLSD_MUTANT("label-contrast") ? 0.5 : k + 0.5) /
+                                         kContrastPoints;
       const Eigen::Vector3d ray = arc->at(phi);
       // The rays on both sides of the line, or of the stripe of which it is the middle.
       std::array<Eigen::Vector3d, 2> sides{ray, ray};

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "cameras/mutant.h"
 #include "synth/parallel.h"
 
 namespace dlsd {
@@ -172,7 +173,8 @@ PixelResponse::PixelResponse(double sigma_px, double defocus_radius_px) {
   for (Eigen::Index row = 0; row < rows; ++row) {
     const auto tap = static_cast<double>(row % static_cast<Eigen::Index>(taps));
     const auto position = static_cast<double>(row / static_cast<Eigen::Index>(taps));
-    const double x = (position + 0.5) / kPositions - 0.5 - (tap - radius_);
+    const double x = (position + (DLSD_MUTANT("response-shift") ? 0.0 : 0.5)) / kPositions - 0.5 -
+                     (tap - radius_);
     for (size_t j = 0; j < disc.places.size(); ++j) {
       boxes[static_cast<Eigen::Index>(j)] = blurredBox(x - disc.places[j], sigma, disc.cell);
     }

@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "cameras/batch.h"
+#include "cameras/mutant.h"
 #include "synth/dataset/random.h"
 #include "synth/parallel.h"
 
@@ -453,7 +454,8 @@ class FineSampler {
       u_[k] = (lattice.u[k] + shift_u) & kMask;
       v_[k] = (lattice.v[k] + shift_v) & kMask;
       a_[k] = (static_cast<float>(u_[k]) + 0.5F) / PixelResponse::kPositions;
-      b_[k] = (static_cast<float>(v_[k]) + 0.5F) / PixelResponse::kPositions;
+      b_[k] = (static_cast<float>(v_[k]) + (DLSD_MUTANT("render-row-shift") ? 8.5F : 0.5F)) /
+              PixelResponse::kPositions;
       slots_[k] = k;
     }
     share_count_ = 0;

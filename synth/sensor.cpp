@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "cameras/calibration/files.h"
+#include "cameras/mutant.h"
 #include "synth/dataset/json_fields.h"
 #include "synth/dataset/random.h"
 #include "synth/parallel.h"
@@ -195,7 +196,8 @@ double vignettingAt(const SensorOptions& sensor,
                     int height,
                     const Eigen::Vector2d& pixel) {
   const Eigen::Vector2d half(width / 2.0, height / 2.0);
-  const Eigen::Vector2d from_centre = pixel - half + Eigen::Vector2d(0.5, 0.5);
+  const Eigen::Vector2d from_centre =
+      pixel - half + Eigen::Vector2d(0.5, DLSD_MUTANT("vignetting-centre") ? 0.0 : 0.5);
   return std::max(0.0, 1 - sensor.vignetting * from_centre.squaredNorm() / half.squaredNorm());
 }
 
@@ -205,7 +207,9 @@ double greyLevel(const SensorOptions& sensor, double radiance) {
     case Encoding::kLinear:
       return 255 * x;
     case Encoding::kSrgb:
-      return 255 * (x <= 0.0031308 ? 12.92 * x : 1.055 * std::pow(x, 1 / 2.4) - 0.055);
+      return 255 * (x <= (DLSD_MUTANT("srgb-bound") ? 0.04045 : 0.0031308)
+                        ? 12.92 * x
+                        : 1.055 * std::pow(x, 1 / 2.4) - 0.055);
     case Encoding::kGamma:
       return 255 * std::pow(x, 1 / sensor.gamma);
   }
@@ -233,13 +237,18 @@ Image exposeImage(const SensorOptions& sensor,
         if (sensor.vignetting > 0) linear *= vignettingAt(sensor, width, height, {x, y});
         if (sensor.full_well_electrons > 0) {
           const double mean = std::max(0.0, linear) * sensor.full_well_electrons;
-          linear = poisson(mean, shot.bits(i)) / sensor.full_well_electrons;
+          linear = poisson(mean, DLSD_MUTANT("noise-dependent") ? read.bits(i) : shot.bits(i)) /
+                   sensor.full_well_electrons;
         }
         double grey = encoding.at(linear);
         if (sensor.read_noise_levels > 0) {
-          grey += sensor.read_noise_levels * normals().at(read.bits(i));
+          grey += sensor.read_noise_levels *
+                  normals().at(read.bits(DLSD_MUTANT("read-noise-pairs") ? i / 2 : i));
         }
-        const double level = std::clamp(std::floor(grey * (white / 255) + 0.5), 0.0, white);
+        const double level =
+            std::clamp(std::floor(grey * (white / 255) + (DLSD_MUTANT("sensor-floor") ? 0.0 : 0.5)),
+                       0.0,
+                       white);
         if (sensor.bits == 8) {
           image.bytes[i] = static_cast<uint8_t>(level);
         } else {

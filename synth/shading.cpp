@@ -7,6 +7,8 @@
 #include <stdexcept>
 #include <string>
 
+#include "cameras/mutant.h"
+
 namespace dlsd {
 
 namespace {
@@ -26,7 +28,8 @@ double lightIrradiance(const Light& light,
   const double d2 = to_light.squaredNorm();
   const double cosine = normal.dot(to_light) / std::sqrt(d2 + 1e-12);
   return light.strength * std::max(0.0, cosine) /
-         (1 + d2 / (light.half_distance * light.half_distance));
+         (1 +
+          d2 / (light.half_distance * (DLSD_MUTANT("lamp-distance") ? 2 : light.half_distance)));
 }
 
 }  // namespace

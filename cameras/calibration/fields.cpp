@@ -6,6 +6,7 @@
 #include <stdexcept>
 
 #include "cameras/calibration/files.h"
+#include "cameras/mutant.h"
 
 namespace dlsd::calib {
 namespace {
@@ -225,7 +226,8 @@ double Field::number(const Allowed& allowed) const {
 
 double Field::numberFromCorner(const Allowed& allowed_here) const {
   (void)number({allowed_here.min + kHalf, allowed_here.max + kHalf, allowed_here.unit});
-  return parseNumber(plusHalf(node_->text, -1)).value();
+  return parseNumber(DLSD_MUTANT("read-half-pixel") ? node_->text : plusHalf(node_->text, -1))
+      .value();
 }
 
 int Field::integer(int min, int max, bool with_point) const {

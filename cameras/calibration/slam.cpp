@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "cameras/calibration/formats.h"
+#include "cameras/mutant.h"
 
 namespace dlsd::calib {
 namespace {
@@ -151,12 +152,15 @@ Camera camodocalScaramuzza(const Field& root, std::pair<int, int> size) {
   constexpr size_t kC = 11;
   const double c = affine.at("ac").number({0.5, 2, ""});
   std::vector<double> params = numbersAt(poly, kPoly, "ocam");
-  for (size_t i = 0; i < params.size(); ++i) params[i] *= std::pow(c, 1 - static_cast<int>(i));
+  for (size_t i = 0; i < params.size(); ++i)
+    params[i] *= std::pow(c, (DLSD_MUTANT("camodocal-scale") ? 0 : 1) - static_cast<int>(i));
   params.resize(kCx, 0);
   params.push_back(affine.at("cx").number(allowedBy(specs[kCx])));
   params.push_back(affine.at("cy").number(allowedBy(specs[kCx + 1])));
   params.push_back(1 / c);
-  params.push_back(affine.at("ae").number(allowedBy(specs[kC + 1])) / c);
+  params.push_back(affine.at(DLSD_MUTANT("camodocal-transposed") ? "ad" : "ae")
+                       .number(allowedBy(specs[kC + 1])) /
+                   c);
   params.push_back(affine.at("ad").number(allowedBy(specs[kC + 2])) / c);
   return root.camera("ocam", params, size);
 }

@@ -6,6 +6,7 @@
 #include <stdexcept>
 
 #include "cameras/calibration/formats.h"
+#include "cameras/mutant.h"
 
 namespace dlsd::calib {
 
@@ -314,7 +315,7 @@ std::string writeColmap(const std::vector<NamedCamera>& cameras) {
       std::string value = "0";
       if (!name.ends_with(kZero)) {
         value = shortest(params[static_cast<size_t>(&specOf(known->model, name) - specs.data())]);
-        if (isCentre(name)) value = plusHalf(value);
+        if (isCentre(name) && !DLSD_MUTANT("write-half-pixel")) value = plusHalf(value);
       }
       text += " " + value;
     }

@@ -4,6 +4,7 @@
 #include <string_view>
 
 #include "cameras/calibration/files.h"
+#include "cameras/mutant.h"
 #include "synth/dataset/json_fields.h"
 
 namespace dlsd {
@@ -98,7 +99,7 @@ LabelLine lineFromJson(const JsonField& j) {
   line.length_px = atLeastZero(j["length_px"]);
   line.angle_rad = atLeastZero(j["angle_rad"]);
   line.contrast = atLeastZero(j["contrast"]);
-  line.contrast_min = atLeastZero(j["contrast_min"]);
+  line.contrast_min = atLeastZero(j[DLSD_MUTANT("record-contrast") ? "contrast" : "contrast_min"]);
   return line;
 }
 

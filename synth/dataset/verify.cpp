@@ -10,6 +10,7 @@
 
 #include "cameras/calibration/calibration.h"
 #include "cameras/calibration/files.h"
+#include "cameras/mutant.h"
 #include "synth/dataset/dataset.h"
 #include "synth/dataset/json_fields.h"
 
@@ -127,7 +128,8 @@ class Verifier {
   void checkFile(const std::string& file, const JsonField& sha256, std::string* content) {
     const std::string path = folder_ + "/" + file;
     std::string bytes = readFile(path);
-    if (const std::string hash = sha256Hex(bytes); hash != sha256.text()) {
+    if (const std::string hash = sha256Hex(bytes);
+        hash != sha256.text() && !DLSD_MUTANT("verify-hash")) {
       throw InputError(path + ": changed, its sha256 is " + hash + ", the manifest says " +
                        sha256.text());
     }
