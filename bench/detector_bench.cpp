@@ -95,7 +95,7 @@ std::vector<std::pair<std::string, std::function<void(const cv::Mat&)>>> peers()
        }}};
 }
 
-int printTimes(int rounds, const std::string& only_camera) {
+int printTimes(int rounds, const std::string& only_camera, bool with_peers) {
   constexpr int kFrames = 8;
   cv::setNumThreads(1);
   fmt::print("median over {} interleaved frames of CPU time / floor\n", rounds * kFrames);
@@ -118,7 +118,8 @@ int printTimes(int rounds, const std::string& only_camera) {
                          (void)detector->detect(viewOf(image));
                        }});
       }
-      for (const auto& [name, run] : peers()) {
+      const auto others = with_peers ? peers() : decltype(peers()){};
+      for (const auto& [name, run] : others) {
         all.push_back({name + " raw", [run = run](const Image& image) { run(matOf(image)); }});
       }
       const Crop crop = cropView(camera,
@@ -130,10 +131,12 @@ int printTimes(int rounds, const std::string& only_camera) {
       const cv::Mat u(maps.height, maps.width, CV_32F, maps.u.data());
       const cv::Mat v(maps.height, maps.width, CV_32F, maps.v.data());
       const auto rectified = std::make_shared<cv::Mat>();
-      all.push_back({"rectification", [rectified, u, v](const Image& image) {
-                       cv::remap(matOf(image), *rectified, u, v, cv::INTER_LINEAR);
-                     }});
-      for (const auto& [name, run] : peers()) {
+      if (with_peers) {
+        all.push_back({"rectification", [rectified, u, v](const Image& image) {
+                         cv::remap(matOf(image), *rectified, u, v, cv::INTER_LINEAR);
+                       }});
+      }
+      for (const auto& [name, run] : others) {
         all.push_back(
             {name + " rectified", [run = run, rectified](const Image&) { run(*rectified); }});
       }
@@ -445,21 +448,23 @@ int printAlarms(int images) {
 
 int usage() {
   fmt::print(stderr,
-             "bench_detector time [ROUNDS [CAMERA]] | quality [--peers] DATA... | efficiency "
+             "bench_detector time [--peers] [ROUNDS [CAMERA]] | quality [--peers] DATA... | efficiency "
              "[REPEATS] | alarms [IMAGES]\n");
   return 2;
 }
 
-int run(const std::vector<std::string>& arguments) {
+int run(std::vector<std::string> arguments) {
+  const bool with_peers = std::erase(arguments, "--peers") > 0;
   if (arguments.empty()) return usage();
   const std::string& mode = arguments[0];
   const auto number = [&](int otherwise) {
     return arguments.size() > 1 ? std::stoi(arguments[1]) : otherwise;
   };
-  if (mode == "time") return printTimes(number(25), arguments.size() > 2 ? arguments[2] : "");
+  if (mode == "time") {
+    return printTimes(number(25), arguments.size() > 2 ? arguments[2] : "", with_peers);
+  }
   if (mode == "quality") {
-    std::vector<std::string> folders(arguments.begin() + 1, arguments.end());
-    const bool with_peers = std::erase(folders, "--peers") > 0;
+    const std::vector<std::string> folders(arguments.begin() + 1, arguments.end());
     return folders.empty() ? usage() : printQualities(folders, with_peers);
   }
   if (mode == "efficiency") return printEfficiency(number(60));

@@ -25,4 +25,4 @@ git -C "$root" log -1 --format='commit %h'
 "$bench" quality --peers "${folders[@]}"
 "$bench" efficiency
 "$bench" alarms
-"$bench" time
+"$bench" time --peers
