@@ -1,11 +1,14 @@
 #include "detector/edge_profile.h"
 
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 
 #if defined(__x86_64__) && defined(__GNUC__)
 #define DLSD_HAVE_AVX2_KERNELS
 #include <immintrin.h>
+#elif defined(__SSE2__)
+#include <emmintrin.h>
 #endif
 
 namespace dlsd {
@@ -53,42 +56,65 @@ double evenSlope(const Filter& even, double variance) {
 }
 
 template <class T>
-void rowSumsPortable(const T* pixels, const EdgeProfiler::Kernels& kernels, int32_t* sums) {
-  for (int k = 0; k < 4; ++k) {
-    int32_t sum = 0;
-    for (int i = 0; i < kTaps; ++i) {
-      sum += static_cast<int32_t>(pixels[i]) * kernels.taps[k][i];
+void sumRowsPortable(EdgeProfiler::Rows<T>* rows) {
+  for (size_t row = 0; row < EdgeProfiler::kRows; ++row) {
+    for (size_t k = 0; k < 4; ++k) {
+      int32_t sum = 0;
+      for (size_t i = 0; i < kTaps; ++i) {
+        sum += static_cast<int32_t>(rows->pixels[row][i]) * rows->kernels[row]->tap(k, i);
+      }
+      rows->sums[row][k] = sum;
     }
-    sums[k] = sum;
   }
 }
 
 #ifdef DLSD_HAVE_AVX2_KERNELS
 #define DLSD_AVX2 __attribute__((target("avx2")))
 
-DLSD_AVX2 inline void rowSumsOf(__m256i pixels,
-                                const EdgeProfiler::Kernels& kernels,
-                                int32_t* sums) {
-  const auto product = [&](int k) __attribute__((target("avx2"))) {
-    return _mm256_madd_epi16(pixels,
-                             _mm256_load_si256(reinterpret_cast<const __m256i*>(kernels.taps[k])));
+DLSD_AVX2 inline __m256i load16(const uint8_t* pixels) {
+  return _mm256_cvtepu8_epi16(_mm_loadu_si128(reinterpret_cast<const __m128i*>(pixels)));
+}
+DLSD_AVX2 inline __m256i load16(const uint16_t* pixels) {
+  return _mm256_loadu_si256(reinterpret_cast<const __m256i*>(pixels));
+}
+template <class T>
+DLSD_AVX2 void sumRowsAvx2(EdgeProfiler::Rows<T>* rows) {
+  for (size_t row = 0; row < EdgeProfiler::kRows; ++row) {
+    const auto* taps = reinterpret_cast<const __m256i*>(rows->kernels[row]->taps);
+    const __m256i pixels = load16(rows->pixels[row]);
+    // Two pixels for each of the four filters, in both halves.
+    const __m256i sum01 =
+        _mm256_add_epi32(_mm256_madd_epi16(_mm256_shuffle_epi32(pixels, 0x00), taps[0]),
+                         _mm256_madd_epi16(_mm256_shuffle_epi32(pixels, 0x55), taps[1]));
+    const __m256i sum23 =
+        _mm256_add_epi32(_mm256_madd_epi16(_mm256_shuffle_epi32(pixels, 0xaa), taps[2]),
+                         _mm256_madd_epi16(_mm256_shuffle_epi32(pixels, 0xff), taps[3]));
+    const __m256i all = _mm256_add_epi32(sum01, sum23);
+    _mm_store_si128(reinterpret_cast<__m128i*>(rows->sums[row].data()),
+                    _mm_add_epi32(_mm256_castsi256_si128(all), _mm256_extracti128_si256(all, 1)));
+  }
+}
+#endif
+
+#ifdef __SSE2__
+/// Rows become columns: 8 x 8 bytes from `from` on; column k goes to to + k * to_stride.
+void transpose8x8(const uint8_t* from, ptrdiff_t stride, uint8_t* to, ptrdiff_t to_stride) {
+  const auto row = [&](int i) {
+    return _mm_loadl_epi64(reinterpret_cast<const __m128i*>(from + i * stride));
   };
-  const __m256i all = _mm256_hadd_epi32(_mm256_hadd_epi32(product(0), product(1)),
-                                        _mm256_hadd_epi32(product(2), product(3)));
-  _mm_storeu_si128(reinterpret_cast<__m128i*>(sums),
-                   _mm_add_epi32(_mm256_castsi256_si128(all), _mm256_extracti128_si256(all, 1)));
-}
-DLSD_AVX2 void rowSums8Avx2(const uint8_t* pixels,
-                            const EdgeProfiler::Kernels& kernels,
-                            int32_t* sums) {
-  rowSumsOf(_mm256_cvtepu8_epi16(_mm_loadu_si128(reinterpret_cast<const __m128i*>(pixels))),
-            kernels,
-            sums);
-}
-DLSD_AVX2 void rowSums16Avx2(const uint16_t* pixels,
-                             const EdgeProfiler::Kernels& kernels,
-                             int32_t* sums) {
-  rowSumsOf(_mm256_loadu_si256(reinterpret_cast<const __m256i*>(pixels)), kernels, sums);
+  const __m128i a01 = _mm_unpacklo_epi8(row(0), row(1)), a23 = _mm_unpacklo_epi8(row(2), row(3));
+  const __m128i a45 = _mm_unpacklo_epi8(row(4), row(5)), a67 = _mm_unpacklo_epi8(row(6), row(7));
+  const __m128i b0 = _mm_unpacklo_epi16(a01, a23), b1 = _mm_unpackhi_epi16(a01, a23);
+  const __m128i b2 = _mm_unpacklo_epi16(a45, a67), b3 = _mm_unpackhi_epi16(a45, a67);
+  const auto store = [&](int k, __m128i two) {
+    _mm_storel_epi64(reinterpret_cast<__m128i*>(to + k * to_stride), two);
+    _mm_storel_epi64(reinterpret_cast<__m128i*>(to + (k + 1) * to_stride),
+                     _mm_unpackhi_epi64(two, two));
+  };
+  store(0, _mm_unpacklo_epi32(b0, b2));
+  store(2, _mm_unpackhi_epi32(b0, b2));
+  store(4, _mm_unpacklo_epi32(b1, b3));
+  store(6, _mm_unpackhi_epi32(b1, b3));
 }
 #endif
 
@@ -100,24 +126,27 @@ double shapeVariance(size_t i) {
 
 /// Taps of a filter whose middle is phase / kPhases behind the centre tap.
 template <class Filter>
-void setTaps(const Filter& filter, size_t phase, int16_t* taps) {
+void setTaps(const Filter& filter, size_t phase, size_t k, EdgeProfiler::Kernels* kernels) {
   int sum = 0;
-  for (int i = 0; i < kTaps; ++i) {
-    const double t = i - kCentreTap - static_cast<double>(phase) / EdgeProfiler::kPhases;
-    taps[i] = static_cast<int16_t>(std::lround(filter(t)));
-    sum += taps[i];
+  for (size_t i = 0; i < kTaps; ++i) {
+    const double t =
+        static_cast<double>(i) - kCentreTap - static_cast<double>(phase) / EdgeProfiler::kPhases;
+    kernels->tap(k, i) = static_cast<int16_t>(std::lround(filter(t)));
+    sum += kernels->tap(k, i);
   }
   // No response at all to a constant grey level.
-  taps[kCentreTap] = static_cast<int16_t>(taps[kCentreTap] - sum);
+  int16_t& centre = kernels->tap(k, kCentreTap);
+  centre = static_cast<int16_t>(centre - sum);
 }
 
 }  // namespace
 
-EdgeProfiler::EdgeProfiler() : row_sums_8_(rowSumsPortable), row_sums_16_(rowSumsPortable) {
+EdgeProfiler::EdgeProfiler()
+    : sum_rows_8_(sumRowsPortable<uint8_t>), sum_rows_16_(sumRowsPortable<uint16_t>) {
 #ifdef DLSD_HAVE_AVX2_KERNELS
   if (__builtin_cpu_supports("avx2") != 0) {
-    row_sums_8_ = rowSums8Avx2;
-    row_sums_16_ = rowSums16Avx2;
+    sum_rows_8_ = sumRowsAvx2<uint8_t>;
+    sum_rows_16_ = sumRowsAvx2<uint16_t>;
   }
 #endif
   const double sigmas[2] = {kNarrowPx, kWidePx};
@@ -164,20 +193,20 @@ EdgeProfiler::EdgeProfiler() : row_sums_8_(rowSumsPortable), row_sums_16_(rowSum
       steps[2 * width + 1][i] = evenSlope(even, shapeVariance(i)) / even_step;
     }
     for (size_t phase = 0; phase < kPhases; ++phase) {
-      setTaps(odd, phase, kernels_[phase].taps[2 * width]);
-      setTaps(even, phase, kernels_[phase].taps[2 * width + 1]);
+      setTaps(odd, phase, 2 * width, &kernels_[phase]);
+      setTaps(even, phase, 2 * width + 1, &kernels_[phase]);
     }
   }
-  const auto norm = [&](const int16_t* taps) {
+  const auto norm = [&](size_t k) {
     double sum = 0;
-    for (int i = 0; i < kTaps; ++i) sum += static_cast<double>(taps[i]) * taps[i];
+    for (size_t i = 0; i < kTaps; ++i) {
+      const double tap = kernels_[0].tap(k, i);
+      sum += tap * tap;
+    }
     return static_cast<float>(std::sqrt(sum));
   };
-  const Kernels& first = kernels_[0];
-  white_noise_ = {norm(first.taps[0]) * scale_[0],
-                  norm(first.taps[1]) * scale_[1],
-                  norm(first.taps[2]) * scale_[2],
-                  norm(first.taps[3]) * scale_[3]};
+  white_noise_ = {
+      norm(0) * scale_[0], norm(1) * scale_[1], norm(2) * scale_[2], norm(3) * scale_[3]};
   for (size_t i = 0; i < kShapes; ++i) {
     ratio_[i] = static_cast<float>(steps[0][i] / steps[2][i]);
     narrow_gain_[i] = static_cast<float>(steps[0][i] / steps[1][i]);
@@ -208,77 +237,93 @@ StepGain EdgeProfiler::gain(double blur_variance) const {
 template <class T>
 void EdgeProfiler::measureTyped(const T* data,
                                 const EdgeWindow& window,
-                                std::array<std::array<int32_t, 4>, kRows>* sums) const {
+                                void (*sum_rows)(Rows<T>*),
+                                const std::array<float, 4>& scale,
+                                std::array<EdgeResponse, kRows>* responses) const {
+  // Positions in units of 2^-16 px.
+  constexpr int kPositionBits = 16, kPhaseBits = 6;
+  static_assert(kPhases == 1 << kPhaseBits);
+  constexpr double kUnit = 1 << kPositionBits;
+  const int64_t first = std::llrint((window.across - 3.5 * window.slope) * kUnit);
+  const int64_t step = std::llrint(window.slope * kUnit);
   const int rows = window.crosses_rows ? pixels_.height : pixels_.width;
   const int columns = window.crosses_rows ? pixels_.width : pixels_.height;
   const ptrdiff_t row_stride = window.crosses_rows ? pixels_.stride : 1;
   const ptrdiff_t column_stride = window.crosses_rows ? 1 : pixels_.stride;
-  std::array<std::array<T, kTaps>, kRows> copies;
-  std::array<const T*, kRows> from{};
-  std::array<size_t, kRows> phases{};
-  const double first = window.across - 3.5 * window.slope;
+  std::array<int, kRows> begin;  // of the pixels of a row
+  std::array<float, kRows> rounding_px;
+  Rows<T> work;
   for (int i = 0; i < kRows; ++i) {
     const size_t k = static_cast<size_t>(i);
-    const int row = window.first_row + i;
-    if (row < 0 || row >= rows) continue;
-    const int position = static_cast<int>(std::floor((first + i * window.slope) * kPhases + 0.5));
-    const int base = position >> 6;
-    static_assert(kPhases == 1 << 6);
-    phases[k] = static_cast<size_t>(position & (static_cast<int>(kPhases) - 1));
-    const int begin = base - kCentreTap;
-    const T* line = data + row * row_stride;
-    if (begin >= 0 && begin + kTaps <= columns) {
-      if (column_stride == 1) {
-        from[k] = line + begin;
-        continue;
-      }
-      const T* source = line + begin * column_stride;
-      for (int tap = 0; tap < kTaps; ++tap, source += column_stride) {
-        copies[k][static_cast<size_t>(tap)] = *source;
-      }
-    } else {
-      for (int tap = 0; tap < kTaps; ++tap) {
-        const int column = std::clamp(begin + tap, 0, columns - 1);
-        copies[k][static_cast<size_t>(tap)] = line[column * column_stride];
-      }
-    }
-    from[k] = copies[k].data();
+    const int64_t exact = first + i * step;
+    const int64_t position =
+        (exact + (1 << (kPositionBits - kPhaseBits - 1))) >> (kPositionBits - kPhaseBits);
+    begin[k] = static_cast<int>(position >> kPhaseBits) - kCentreTap;
+    work.kernels[k] = &kernels_[static_cast<size_t>(position) & (kPhases - 1)];
+    const auto rounding = static_cast<int>(position * (1 << (kPositionBits - kPhaseBits)) - exact);
+    rounding_px[k] = static_cast<float>(rounding) * static_cast<float>(1 / kUnit);
   }
-  for (size_t k = 0; k < kRows; ++k) {
-    if (from[k] == nullptr) {
-      (*sums)[k] = {};
-    } else if constexpr (sizeof(T) == 1) {
-      row_sums_8_(from[k], kernels_[phases[k]], (*sums)[k].data());
-    } else {
-      row_sums_16_(from[k], kernels_[phases[k]], (*sums)[k].data());
+  const int least = std::min(begin.front(), begin.back());
+  const int most = std::max(begin.front(), begin.back());
+  const bool is_inside = least >= 0 && most + kTaps <= columns && window.first_row >= 0 &&
+                         window.first_row + kRows <= rows;
+  constexpr int kBuffer = 40;  // slopes below 2.1 need no more
+  alignas(16) std::array<std::array<T, kBuffer>, kRows> copies;
+  bool is_done = false;
+  if (is_inside && column_stride == 1) {
+    for (size_t k = 0; k < kRows; ++k) {
+      work.pixels[k] = data + (window.first_row + static_cast<int>(k)) * row_stride + begin[k];
     }
+    is_done = true;
+  }
+#ifdef __SSE2__
+  if constexpr (sizeof(T) == 1) {
+    const int blocks = (most - least + kTaps + 7) / 8;
+    if (!is_done && is_inside && 8 * blocks <= kBuffer && least + 8 * blocks <= columns) {
+      for (int b = 0; b < blocks; ++b) {
+        transpose8x8(data + window.first_row + (least + 8 * b) * column_stride,
+                     column_stride,
+                     copies[0].data() + 8 * b,
+                     kBuffer);
+      }
+      for (size_t k = 0; k < kRows; ++k) work.pixels[k] = copies[k].data() + (begin[k] - least);
+      is_done = true;
+    }
+  }
+#endif
+  if (!is_done) {
+    for (size_t k = 0; k < kRows; ++k) {
+      const int row = window.first_row + static_cast<int>(k);
+      work.pixels[k] = copies[k].data();
+      for (int tap = 0; tap < kTaps; ++tap) {
+        const int column = std::clamp(begin[k] + tap, 0, columns - 1);
+        copies[k][static_cast<size_t>(tap)] =
+            row < 0 || row >= rows ? T{0} : data[row * row_stride + column * column_stride];
+      }
+    }
+  }
+  sum_rows(&work);
+  const Eigen::Array4f unit = Eigen::Map<const Eigen::Array4f, Eigen::Aligned16>(scale.data());
+  for (size_t k = 0; k < kRows; ++k) {
+    using Sums = Eigen::Map<const Eigen::Array4i, Eigen::Aligned16>;
+    EdgeResponse& r = (*responses)[k];
+    Eigen::Map<Eigen::Array4f, Eigen::Aligned16>(&r.odd_narrow) =
+        Sums(work.sums[k].data()).cast<float>() * unit;
+    // The positions were rounded to the filters' phases: moved back, to first order.
+    r.even_narrow += rounding_px[k] * r.odd_narrow;
+    r.even_wide += rounding_px[k] * r.odd_wide;
   }
 }
 
 void EdgeProfiler::measure(const EdgeWindow& window,
                            std::array<EdgeResponse, kRows>* responses) const {
-  std::array<std::array<int32_t, 4>, kRows> sums;
-  float unit = 1;
   if (pixels_.u8 != nullptr) {
-    measureTyped(pixels_.u8, window, &sums);
-  } else {
-    measureTyped(pixels_.fixed, window, &sums);
-    unit = 1.0F / kGreyUnit;
+    measureTyped(pixels_.u8, window, sum_rows_8_, scale_, responses);
+    return;
   }
-  // The positions were rounded to the filters' phases: moved back, to first order.
-  const double first = window.across - 3.5 * window.slope;
-  for (int i = 0; i < kRows; ++i) {
-    const auto& s = sums[static_cast<size_t>(i)];
-    EdgeResponse& r = (*responses)[static_cast<size_t>(i)];
-    r.odd_narrow = static_cast<float>(s[0]) * scale_[0] * unit;
-    r.even_narrow = static_cast<float>(s[1]) * scale_[1] * unit;
-    r.odd_wide = static_cast<float>(s[2]) * scale_[2] * unit;
-    r.even_wide = static_cast<float>(s[3]) * scale_[3] * unit;
-    const double exact = (first + i * window.slope) * kPhases;
-    const auto rounding = static_cast<float>((std::floor(exact + 0.5) - exact) * (1.0 / kPhases));
-    r.even_narrow += rounding * r.odd_narrow;
-    r.even_wide += rounding * r.odd_wide;
-  }
+  alignas(16) std::array<float, 4> scale = scale_;
+  for (float& value : scale) value /= kGreyUnit;
+  measureTyped(pixels_.fixed, window, sum_rows_16_, scale, responses);
 }
 
 }  // namespace dlsd

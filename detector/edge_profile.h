@@ -14,7 +14,7 @@ namespace dlsd {
 /// the offset in px from here to the step, to first order, if its blur is
 /// EdgeProfiler::kBlurVariance (StepGain: for others). The narrow filters keep apart what is close
 /// together, the wide ones average more noise.
-struct EdgeResponse {
+struct alignas(16) EdgeResponse {
   float odd_narrow, even_narrow, odd_wide, even_wide;
 };
 
@@ -74,25 +74,37 @@ class EdgeProfiler {
   static constexpr int kTaps = 16;
   static constexpr size_t kPhases = 64;
   static constexpr size_t kShapes = 24;  ///< Blurs for which gains are tabulated.
+  /// The taps of the four filters: of pixels 2j and 2j + 1, then 2j + 8 and 2j + 9, for all j < 4.
   struct Kernels {
-    alignas(32) int16_t taps[4][kTaps];
+    alignas(32) int16_t taps[4][2][4][2];
+    int16_t& tap(size_t filter, size_t i) { return taps[i % 8 / 2][i / 8][filter][i % 2]; }
+    [[nodiscard]] int16_t tap(size_t filter, size_t i) const {
+      return taps[i % 8 / 2][i / 8][filter][i % 2];
+    }
+  };
+  /// Eight rows: where their pixels and filters are, and what the filters answer.
+  template <class T>
+  struct Rows {
+    std::array<const T*, kRows> pixels;
+    std::array<const Kernels*, kRows> kernels;
+    alignas(16) std::array<std::array<int32_t, 4>, kRows> sums;
   };
 
  private:
   template <class T>
   void measureTyped(const T* data,
                     const EdgeWindow& window,
-                    std::array<std::array<int32_t, 4>, kRows>* sums) const;
+                    void (*sum_rows)(Rows<T>*),
+                    const std::array<float, 4>& scale,
+                    std::array<EdgeResponse, kRows>* responses) const;
 
   GreyPixels pixels_;
   std::array<Kernels, kPhases> kernels_;
-  std::array<float, 4> scale_;  // of integer sums of 8-bit pixels
+  alignas(16) std::array<float, 4> scale_;  // of integer sums of 8-bit pixels
   EdgeResponse white_noise_{}, ramp_{};
   std::array<float, kShapes> ratio_{}, narrow_gain_{}, wide_gain_{};
-  using RowSums8 = void (*)(const uint8_t*, const Kernels&, int32_t*);
-  using RowSums16 = void (*)(const uint16_t*, const Kernels&, int32_t*);
-  RowSums8 row_sums_8_;
-  RowSums16 row_sums_16_;
+  void (*sum_rows_8_)(Rows<uint8_t>*);
+  void (*sum_rows_16_)(Rows<uint16_t>*);
 };
 
 }  // namespace dlsd
