@@ -81,20 +81,12 @@ class RayTable {
 
 inline RaySample RayTable::interpolate(const Cell& cell) const {
   // Lagrange polynomials for nodes at -1, 0, 1, 2 and their derivatives.
-  const auto weights = [](float t, float* w, float* d) {
-    const float t2 = t * t;
-    w[0] = t * (t - 1) * (2 - t) * (1.0F / 6);
-    w[1] = (t2 - 1) * (t - 2) * 0.5F;
-    w[2] = t * (t + 1) * (2 - t) * 0.5F;
-    w[3] = t * (t2 - 1) * (1.0F / 6);
-    d[0] = (-3 * t2 + 6 * t - 2) * (1.0F / 6);
-    d[1] = (3 * t2 - 4 * t - 1) * 0.5F;
-    d[2] = (-3 * t2 + 2 * t + 2) * 0.5F;
-    d[3] = (3 * t2 - 1) * (1.0F / 6);
-  };
-  float wu[4], wv[4], du[4], dv[4];
-  weights(cell.a, wu, du);
-  weights(cell.b, wv, dv);
+  const Eigen::Array4f c0(0, 1, 0, 0), c1(-1.0F / 3, -0.5F, 1, -1.0F / 6), c2(0.5F, -1, 0.5F, 0),
+      c3(-1.0F / 6, 0.5F, -0.5F, 1.0F / 6);
+  const auto weights = [&](float t) -> Eigen::Array4f { return c0 + t * (c1 + t * (c2 + t * c3)); };
+  const auto slopes = [&](float t) -> Eigen::Array4f { return c1 + t * (2 * c2 + (3 * t) * c3); };
+  const Eigen::Array4f wu = weights(cell.a), wv = weights(cell.b);
+  const Eigen::Array4f du = slopes(cell.a), dv = slopes(cell.b);
   Eigen::Vector4f value = Eigen::Vector4f::Zero(), along_u = value, along_v = value;
   const Eigen::Vector4f* row = &nodes_[cell.node];
   for (int j = 0; j < 4; ++j, row += nodes_per_row_) {

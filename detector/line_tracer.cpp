@@ -33,8 +33,9 @@ double narrowLevel(const EdgeResponse& r) {
   return odd == 0 ? 0 : std::abs(odd) * (1 + 0.15 * std::min(1.0, even * even / (odd * odd)));
 }
 
-Eigen::Vector3d projected(const Eigen::Vector3d& ray, const Eigen::Vector3d& normal) {
-  return (ray - ray.dot(normal) * normal).normalized();
+/// Nearest pixel, of positions not far outside the image.
+int pixelOf(float position) {
+  return static_cast<int>(position + 0.5F);
 }
 
 }  // namespace
@@ -135,8 +136,7 @@ bool LineTracer::evaluate(Front* front, int direction, std::array<Quad, 2>* quad
   p = front->position;
   const int a = front->crosses_rows ? 0 : 1;  // axis across the rows
   // Along the curve's tangent (-ny, nx) turned by `direction`: which way along the rows?
-  const int first_row = direction > 0 ? static_cast<int>(std::floor(p[1 - a] + 1))
-                                      : static_cast<int>(std::floor(p[1 - a] + 1)) - 8;
+  const int first_row = static_cast<int>(p[1 - a] + 1) - (direction > 0 ? 0 : 8);
   const double centre = first_row + kHalf - 0.5;
   const double ahead = centre - p[1 - a];
   Eigen::Vector2d at;
@@ -168,35 +168,34 @@ bool LineTracer::evaluate(Front* front, int direction, std::array<Quad, 2>* quad
   profiler_.measure(window, &rows);
 
   const Eigen::Vector3d& across = a == 0 ? sample.du : sample.dv;
-  const Eigen::Vector3d along = (a == 0 ? sample.dv : sample.du) + slope * across;
-  const double perpendicular = std::abs(g[a]) / g.norm();
+  const Eigen::Vector3d along = (a == 0 ? sample.dv : sample.du) + slope * across;  // in the plane
+  const Eigen::Vector3d on_plane = sample.ray - sample.ray.dot(normal_) * normal_;
+  const auto perpendicular = static_cast<float>(std::abs(g[a]) / std::sqrt(g.squaredNorm()));
   for (size_t half = 0; half < 2; ++half) {
     const size_t first = (direction > 0) == (half == 0) ? 0 : 4;
     Quad& q = (*quads)[half];
     const double ahead_of_centre = first == 0 ? -2 : 2;
-    q.ray = projected(sample.ray + ahead_of_centre * along, normal_);
+    q.ray = on_plane + ahead_of_centre * along;
     q.across = across;
-    Eigen::Vector2d px;
-    px[a] = at[a] + ahead_of_centre * slope;
-    px[1 - a] = centre + ahead_of_centre;
-    q.x = static_cast<float>(px.x());
-    q.y = static_cast<float>(px.y());
+    const auto px_across = static_cast<float>(at[a] + ahead_of_centre * slope);
+    const auto px_along = static_cast<float>(centre + ahead_of_centre);
+    q.x = a == 0 ? px_across : px_along;
+    q.y = a == 0 ? px_along : px_across;
     q.slope = static_cast<float>(slope);
-    q.perpendicular = static_cast<float>(perpendicular);
+    q.perpendicular = perpendicular;
     q.crosses_rows = front->crosses_rows;
     q.way = static_cast<int8_t>(direction);
-    EdgeResponse mean{};
-    q.turn = 0;
+    const auto row = [&](size_t k) {
+      return Eigen::Map<const Eigen::Array4f, Eigen::Aligned16>(&rows[first + k].odd_narrow);
+    };
+    Eigen::Map<Eigen::Array4f, Eigen::Aligned16>(&q.mean.odd_narrow) =
+        0.25F * ((row(0) + row(1)) + (row(2) + row(3)));
+    const Eigen::Array4f turn = 0.3F * (row(3) - row(0)) + 0.1F * (row(2) - row(1));
+    q.turn = turn[wide_ ? 3 : 1];
     for (size_t k = 0; k < 4; ++k) {
       const EdgeResponse& r = rows[first + k];
-      q.turn += (static_cast<float>(k) - 1.5F) * (wide_ ? r.even_wide : r.even_narrow) / 5;
-      mean.odd_narrow += r.odd_narrow / 4;
-      mean.even_narrow += r.even_narrow / 4;
-      mean.odd_wide += r.odd_wide / 4;
-      mean.even_wide += r.even_wide / 4;
       q.odd[direction > 0 ? k : 3 - k] = wide_ ? r.odd_wide : r.odd_narrow;
     }
-    q.mean = mean;
     judge(&q);
   }
   // On to the border behind the eight rows.
@@ -244,15 +243,15 @@ bool LineTracer::refit() {
   return true;
 }
 
-void LineTracer::extend(int direction, std::vector<Quad>* quads, Front* front) {
+void LineTracer::extend(int direction, Front* front) {
   int misses = 0;
   std::array<Quad, 2> next;
-  Eigen::Vector3d last_ray = quads->empty() ? Eigen::Vector3d::Zero() : quads->back().ray;
+  Eigen::Vector3d last_ray = quads_.empty() ? Eigen::Vector3d::Zero() : quads_.back().ray;
   while (!front->ended) {
     // The walk goes along the tangent; which way that is along the rows changes with them.
     int way = direction;
-    if (!quads->empty()) {
-      const Quad& last = quads->back();
+    if (!quads_.empty()) {
+      const Quad& last = quads_.back();
       way = last.way;
       if (!front->has_slope && !orient(front)) {
         front->ended = front->at_border = true;
@@ -268,8 +267,7 @@ void LineTracer::extend(int direction, std::vector<Quad>* quads, Front* front) {
       break;
     }
     for (const Quad& q : next) {
-      const int x = static_cast<int>(std::floor(static_cast<double>(q.x) + 0.5));
-      const int y = static_cast<int>(std::floor(static_cast<double>(q.y) + 0.5));
+      const int x = pixelOf(q.x), y = pixelOf(q.y);
       if (!usable_->contains(x, y)) {
         front->ended = true;
         front->at_border = !seen_->contains(x, y);
@@ -277,7 +275,7 @@ void LineTracer::extend(int direction, std::vector<Quad>* quads, Front* front) {
       }
       if (!last_ray.isZero()) angle_rad_ += (q.ray - last_ray).norm();
       last_ray = q.ray;
-      quads->push_back(q);
+      quads_.push_back(q);
       if (q.is_edge) {
         misses = 0;
         add(q);
@@ -293,20 +291,32 @@ void LineTracer::extend(int direction, std::vector<Quad>* quads, Front* front) {
   }
 }
 
-/// Cuts what lies beyond the last edge, and runs shorter than kMinRunPx that are only reached
-/// across a gap.
-void LineTracer::cutTail(std::vector<Quad>* quads) {
+/// How many quads from `tip` on, which is at an end of the line, lie beyond the last edge or in
+/// runs shorter than kMinRunPx that are only reached across a gap.
+template <class Iterator>
+static ptrdiff_t looseQuads(Iterator tip, Iterator other_end) {
+  Iterator at = tip;
   for (;;) {
-    while (!quads->empty() && !quads->back().is_edge) quads->pop_back();
-    int run = 0;
-    size_t i = quads->size();
-    while (i > 0 && (*quads)[i - 1].is_edge && run * kQuadPx < kMinRunPx) {
-      --i;
-      ++run;
+    while (at != other_end && !at->is_edge) ++at;
+    Iterator behind = at;
+    int run_px = 0;
+    for (; behind != other_end && behind->is_edge && run_px < LineTracer::kMinRunPx; ++behind) {
+      run_px += LineTracer::kQuadPx;
     }
-    if (i == 0 || run * kQuadPx >= kMinRunPx) return;
-    quads->resize(i);
+    if (behind == other_end || run_px >= LineTracer::kMinRunPx) return at - tip;
+    at = behind;
   }
+}
+
+/// Cuts the ends, which then are not at the border any more. False if too little remains.
+bool LineTracer::cutEnds(Front* front, Front* back) {
+  const ptrdiff_t behind = looseQuads(quads_.rbegin(), quads_.rend());
+  quads_.resize(quads_.size() - static_cast<size_t>(behind));
+  const ptrdiff_t before = looseQuads(quads_.begin(), quads_.end());
+  quads_.erase(quads_.begin(), quads_.begin() + before);
+  front->at_border = front->at_border && behind == 0;
+  back->at_border = back->at_border && before == 0;
+  return quads_.size() >= kMinQuads;
 }
 
 /// Residuals of an arc of radius r and length l against its best plane are a parabola of height
@@ -466,9 +476,18 @@ void LineTracer::refine() {
   const auto wideOffset = [&](const Quad& q, const StepGain& gain) {
     return gain.wide * q.mean.even_wide / q.mean.odd_wide;
   };
+  // In steps of kSlant, one after the other mostly the same.
+  constexpr float kSlant = 1.0F / 64;
+  int slant = 0;
+  StepGain slant_gain{};
   const auto gainOf = [&](const Quad& q) {
-    const double p = static_cast<double>(q.perpendicular);
-    return profiler_.gain(row_variance / stretch / (p * p));
+    const int its_slant = static_cast<int>(q.perpendicular * (1 / kSlant) + 0.5F);
+    if (its_slant != slant) {
+      slant = its_slant;
+      const double p = static_cast<double>(kSlant) * slant;
+      slant_gain = profiler_.gain(row_variance / stretch / (p * p));
+    }
+    return slant_gain;
   };
   const auto sigmaOf = [](float gain, float noise, float level) {
     return gain * noise / std::abs(level);
@@ -569,6 +588,9 @@ std::optional<TracedLine> LineTracer::trace(const PlanarPiece& piece,
     add(probed[i]);
   }
   if (!refit()) return std::nullopt;
+  const double wide_tolerance =
+      3 * static_cast<double>(noise_.odd_wide) * std::sqrt(static_cast<double>(count));
+  if (wide_level > static_cast<double>(kMaxWideRatio) * level + wide_tolerance) return std::nullopt;
   const double tolerance = 2 * static_cast<double>(noise_.odd_narrow) * std::sqrt(points_);
   const bool stands_alone = wide_level >= kAloneRatio[0] * level - tolerance &&
                             wide_level <= kAloneRatio[1] * level + tolerance;
@@ -584,7 +606,6 @@ std::optional<TracedLine> LineTracer::trace(const PlanarPiece& piece,
   moments_ = {};
   points_ = points_at_fit_ = 0;
   quads_.clear();
-  forward_.clear();
   const Eigen::Vector2d start = piece.start_px;
   const RaySample sample = rays_.at(start.x(), start.y());
   const Eigen::Vector2d g(sample.du.dot(normal_), sample.dv.dot(normal_));
@@ -595,29 +616,19 @@ std::optional<TracedLine> LineTracer::trace(const PlanarPiece& piece,
   front.position = start - f * g.normalized();
   Front back = front;
   points_at_fit_ = 8;
-  extend(+1, &forward_, &front);
-  // The same border between rows, the other way.
-  extend(-1, &quads_, &back);
-  if (points_ < 2 || !refit()) return std::nullopt;
-  const auto cut = [&](std::vector<Quad>* quads, Front* end) {
-    const size_t size = quads->size();
-    cutTail(quads);
-    end->at_border = end->at_border && quads->size() == size;
-  };
+  extend(-1, &back);
+  const auto loose = static_cast<size_t>(looseQuads(quads_.rbegin(), quads_.rend()));
+  quads_.resize(quads_.size() - loose);
+  back.at_border = back.at_border && loose == 0;
   std::reverse(quads_.begin(), quads_.end());
   for (Quad& q : quads_) {
     q.way = static_cast<int8_t>(-q.way);
     std::reverse(q.odd.begin(), q.odd.end());
   }
-  quads_.insert(quads_.end(), forward_.begin(), forward_.end());
-  const auto cutBoth = [&] {
-    cut(&quads_, &front);
-    std::reverse(quads_.begin(), quads_.end());
-    cut(&quads_, &back);
-    std::reverse(quads_.begin(), quads_.end());
-    return quads_.size() >= 3;
-  };
-  if (!cutBoth()) return std::nullopt;
+  // From the same border between rows, the other way.
+  extend(+1, &front);
+  if (points_ < 2 || !refit()) return std::nullopt;
+  if (!cutEnds(&front, &back)) return std::nullopt;
 
   double narrow = 0, wide = 0;
   for (const Quad& q : quads_) {
@@ -629,7 +640,7 @@ std::optional<TracedLine> LineTracer::trace(const PlanarPiece& piece,
   line.score = scoreOf();
   if (!(line.score >= options_.min_score)) return std::nullopt;
   refine();
-  if (!cutBoth()) return std::nullopt;
+  if (!cutEnds(&front, &back)) return std::nullopt;
 
   // Near its ends an edge meets others, which move it: a line that has enough points is fitted
   // without, and then again with what agrees. Where the end turns away, another edge begins.
@@ -671,7 +682,7 @@ std::optional<TracedLine> LineTracer::trace(const PlanarPiece& piece,
       back.at_border = false;
     }
     if (quads_.size() == size) break;
-    if (!cutBoth()) return std::nullopt;
+    if (!cutEnds(&front, &back)) return std::nullopt;
   }
   const auto agrees = [&](const Quad& q, bool is_whole) {
     const Eigen::Vector3d ray = q.ray + static_cast<double>(q.offset_px) * q.across;
@@ -697,8 +708,9 @@ std::optional<TracedLine> LineTracer::trace(const PlanarPiece& piece,
   for (size_t i = 0; i < quads_.size(); ++i) {
     const Quad& q = quads_[i];
     if (i > 0) {
-      line.length_px += std::hypot(static_cast<double>(q.x - quads_[i - 1].x),
-                                   static_cast<double>(q.y - quads_[i - 1].y));
+      const auto dx = static_cast<double>(q.x - quads_[i - 1].x);
+      const auto dy = static_cast<double>(q.y - quads_[i - 1].y);
+      line.length_px += std::sqrt(dx * dx + dy * dy);
     }
     if (!q.is_edge || i < begin || i >= end) continue;
     const double rad_per_px = q.across.dot(fit->normal);

@@ -78,6 +78,7 @@ class LineTracer {
 
   static constexpr int kMinRunPx = 8;
   static constexpr int kQuadPx = 4;
+  static constexpr size_t kMinQuads = 3;
 
  private:
   struct Front {
@@ -98,14 +99,14 @@ class LineTracer {
   bool evaluate(Front* front, int direction, std::array<Quad, 2>* quads) const;
   void judge(Quad* quad) const;
   void add(const Quad& quad);
-  void extend(int direction, std::vector<Quad>* quads, Front* front);
+  void extend(int direction, Front* front);
   bool refit();
   void refine();
   [[nodiscard]] bool isArc(const Eigen::Vector3d& normal) const;
   [[nodiscard]] double scoreOf() const;
   [[nodiscard]] int rowsOfEnd(size_t first, size_t last) const;
   [[nodiscard]] End endOf(size_t first, size_t last, bool at_border) const;
-  static void cutTail(std::vector<Quad>* quads);
+  bool cutEnds(Front* front, Front* back);
 
   const RayTable& rays_;
   const BitRows *usable_ = nullptr, *seen_ = nullptr;
@@ -115,7 +116,7 @@ class LineTracer {
   ResponseNoise noise_;
   float min_odd_narrow_ = 0, min_odd_wide_ = 0;
 
-  std::vector<Quad> quads_, forward_;
+  std::vector<Quad> quads_;
   RayMoments moments_;
   Eigen::Vector3d normal_;
   bool wide_ = false;  // which filters judge

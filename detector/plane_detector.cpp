@@ -52,7 +52,7 @@ void forRows(const LineTracer::Quad& quad, F&& f) {
     const float ahead = static_cast<float>(i) - 1.5F;
     const float x = quad.crosses_rows ? quad.x + ahead * quad.slope : quad.x + ahead;
     const float y = quad.crosses_rows ? quad.y + ahead : quad.y + ahead * quad.slope;
-    f(static_cast<int>(std::floor(x + 0.5F)), static_cast<int>(std::floor(y + 0.5F)));
+    f(static_cast<int>(x + 0.5F), static_cast<int>(y + 0.5F));
   }
 }
 
