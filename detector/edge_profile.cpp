@@ -1,6 +1,5 @@
 #include "detector/edge_profile.h"
 
-#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 
@@ -56,15 +55,26 @@ double evenSlope(const Filter& even, double variance) {
 }
 
 template <class T>
-void sumRowsPortable(EdgeProfiler::Rows<T>* rows) {
+void measurePortable(const EdgeProfiler::Rows<T>& rows,
+                     const EdgeProfiler::Kernels* kernels,
+                     const std::array<float, 4>& scale,
+                     EdgeResponse* responses) {
   for (size_t row = 0; row < EdgeProfiler::kRows; ++row) {
+    const EdgeProfiler::Kernels& its_kernels = kernels[rows.phases[row]];
+    std::array<float, 4> response;
     for (size_t k = 0; k < 4; ++k) {
       int32_t sum = 0;
       for (size_t i = 0; i < kTaps; ++i) {
-        sum += static_cast<int32_t>(rows->pixels[row][i]) * rows->kernels[row]->tap(k, i);
+        sum += static_cast<int32_t>(rows.pixels[row][i]) * its_kernels.tap(k, i);
       }
-      rows->sums[row][k] = sum;
+      response[k] = static_cast<float>(sum) * scale[k];
     }
+    // The positions were rounded to the filters' phases: moved back, to first order.
+    const float rounding = rows.rounding_px[row];
+    responses[row] = {response[0],
+                      response[1] + rounding * response[0],
+                      response[2],
+                      response[3] + rounding * response[2]};
   }
 }
 
@@ -78,10 +88,14 @@ DLSD_AVX2 inline __m256i load16(const uint16_t* pixels) {
   return _mm256_loadu_si256(reinterpret_cast<const __m256i*>(pixels));
 }
 template <class T>
-DLSD_AVX2 void sumRowsAvx2(EdgeProfiler::Rows<T>* rows) {
+DLSD_AVX2 void measureAvx2(const EdgeProfiler::Rows<T>& rows,
+                           const EdgeProfiler::Kernels* kernels,
+                           const std::array<float, 4>& scale,
+                           EdgeResponse* responses) {
+  const __m128 unit = _mm_load_ps(scale.data());
   for (size_t row = 0; row < EdgeProfiler::kRows; ++row) {
-    const auto* taps = reinterpret_cast<const __m256i*>(rows->kernels[row]->taps);
-    const __m256i pixels = load16(rows->pixels[row]);
+    const auto* taps = reinterpret_cast<const __m256i*>(kernels[rows.phases[row]].taps);
+    const __m256i pixels = load16(rows.pixels[row]);
     // Two pixels for each of the four filters, in both halves.
     const __m256i sum01 =
         _mm256_add_epi32(_mm256_madd_epi16(_mm256_shuffle_epi32(pixels, 0x00), taps[0]),
@@ -90,8 +104,13 @@ DLSD_AVX2 void sumRowsAvx2(EdgeProfiler::Rows<T>* rows) {
         _mm256_add_epi32(_mm256_madd_epi16(_mm256_shuffle_epi32(pixels, 0xaa), taps[2]),
                          _mm256_madd_epi16(_mm256_shuffle_epi32(pixels, 0xff), taps[3]));
     const __m256i all = _mm256_add_epi32(sum01, sum23);
-    _mm_store_si128(reinterpret_cast<__m128i*>(rows->sums[row].data()),
-                    _mm_add_epi32(_mm256_castsi256_si128(all), _mm256_extracti128_si256(all, 1)));
+    const __m128i sums =
+        _mm_add_epi32(_mm256_castsi256_si128(all), _mm256_extracti128_si256(all, 1));
+    const __m128 response = _mm_mul_ps(_mm_cvtepi32_ps(sums), unit);
+    // Odd responses in place of even ones, 0 in place of odd ones.
+    const __m128 odd = _mm_castsi128_ps(_mm_slli_epi64(_mm_castps_si128(response), 32));
+    const __m128 rounding = _mm_set1_ps(rows.rounding_px[row]);
+    _mm_store_ps(&responses[row].odd_narrow, _mm_add_ps(response, _mm_mul_ps(rounding, odd)));
   }
 }
 #endif
@@ -142,11 +161,11 @@ void setTaps(const Filter& filter, size_t phase, size_t k, EdgeProfiler::Kernels
 }  // namespace
 
 EdgeProfiler::EdgeProfiler()
-    : sum_rows_8_(sumRowsPortable<uint8_t>), sum_rows_16_(sumRowsPortable<uint16_t>) {
+    : measure_8_(measurePortable<uint8_t>), measure_16_(measurePortable<uint16_t>) {
 #ifdef DLSD_HAVE_AVX2_KERNELS
   if (__builtin_cpu_supports("avx2") != 0) {
-    sum_rows_8_ = sumRowsAvx2<uint8_t>;
-    sum_rows_16_ = sumRowsAvx2<uint16_t>;
+    measure_8_ = measureAvx2<uint8_t>;
+    measure_16_ = measureAvx2<uint16_t>;
   }
 #endif
   const double sigmas[2] = {kNarrowPx, kWidePx};
@@ -237,31 +256,29 @@ StepGain EdgeProfiler::gain(double blur_variance) const {
 template <class T>
 void EdgeProfiler::measureTyped(const T* data,
                                 const EdgeWindow& window,
-                                void (*sum_rows)(Rows<T>*),
+                                Measure<T> measure_rows,
                                 const std::array<float, 4>& scale,
                                 std::array<EdgeResponse, kRows>* responses) const {
-  // Positions in units of 2^-16 px.
-  constexpr int kPositionBits = 16, kPhaseBits = 6;
-  static_assert(kPhases == 1 << kPhaseBits);
-  constexpr double kUnit = 1 << kPositionBits;
-  const int64_t first = std::llrint((window.across - 3.5 * window.slope) * kUnit);
-  const int64_t step = std::llrint(window.slope * kUnit);
   const int rows = window.crosses_rows ? pixels_.height : pixels_.width;
   const int columns = window.crosses_rows ? pixels_.width : pixels_.height;
   const ptrdiff_t row_stride = window.crosses_rows ? pixels_.stride : 1;
   const ptrdiff_t column_stride = window.crosses_rows ? 1 : pixels_.stride;
+  // Positions in units of 2^-16 px from a whole pixel near the first.
+  constexpr int kPositionBits = 16, kPhaseBits = 6, kRestBits = kPositionBits - kPhaseBits;
+  static_assert(kPhases == 1 << kPhaseBits);
+  constexpr double kUnit = 1 << kPositionBits;
+  const double first_px = window.across - 3.5 * window.slope;
+  const int base = static_cast<int>(first_px);
+  int exact = static_cast<int>((first_px - base) * kUnit);
+  const int step = static_cast<int>(window.slope * kUnit);
   std::array<int, kRows> begin;  // of the pixels of a row
-  std::array<float, kRows> rounding_px;
   Rows<T> work;
-  for (int i = 0; i < kRows; ++i) {
-    const size_t k = static_cast<size_t>(i);
-    const int64_t exact = first + i * step;
-    const int64_t position =
-        (exact + (1 << (kPositionBits - kPhaseBits - 1))) >> (kPositionBits - kPhaseBits);
-    begin[k] = static_cast<int>(position >> kPhaseBits) - kCentreTap;
-    work.kernels[k] = &kernels_[static_cast<size_t>(position) & (kPhases - 1)];
-    const auto rounding = static_cast<int>(position * (1 << (kPositionBits - kPhaseBits)) - exact);
-    rounding_px[k] = static_cast<float>(rounding) * static_cast<float>(1 / kUnit);
+  for (size_t k = 0; k < kRows; ++k, exact += step) {
+    const int position = (exact + (1 << (kRestBits - 1))) >> kRestBits;
+    begin[k] = base + (position >> kPhaseBits) - kCentreTap;
+    work.phases[k] = position & (static_cast<int>(kPhases) - 1);
+    work.rounding_px[k] =
+        static_cast<float>(position * (1 << kRestBits) - exact) * static_cast<float>(1 / kUnit);
   }
   const int least = std::min(begin.front(), begin.back());
   const int most = std::max(begin.front(), begin.back());
@@ -302,28 +319,18 @@ void EdgeProfiler::measureTyped(const T* data,
       }
     }
   }
-  sum_rows(&work);
-  const Eigen::Array4f unit = Eigen::Map<const Eigen::Array4f, Eigen::Aligned16>(scale.data());
-  for (size_t k = 0; k < kRows; ++k) {
-    using Sums = Eigen::Map<const Eigen::Array4i, Eigen::Aligned16>;
-    EdgeResponse& r = (*responses)[k];
-    Eigen::Map<Eigen::Array4f, Eigen::Aligned16>(&r.odd_narrow) =
-        Sums(work.sums[k].data()).cast<float>() * unit;
-    // The positions were rounded to the filters' phases: moved back, to first order.
-    r.even_narrow += rounding_px[k] * r.odd_narrow;
-    r.even_wide += rounding_px[k] * r.odd_wide;
-  }
+  measure_rows(work, kernels_.data(), scale, responses->data());
 }
 
 void EdgeProfiler::measure(const EdgeWindow& window,
                            std::array<EdgeResponse, kRows>* responses) const {
   if (pixels_.u8 != nullptr) {
-    measureTyped(pixels_.u8, window, sum_rows_8_, scale_, responses);
+    measureTyped(pixels_.u8, window, measure_8_, scale_, responses);
     return;
   }
   alignas(16) std::array<float, 4> scale = scale_;
   for (float& value : scale) value /= kGreyUnit;
-  measureTyped(pixels_.fixed, window, sum_rows_16_, scale, responses);
+  measureTyped(pixels_.fixed, window, measure_16_, scale, responses);
 }
 
 }  // namespace dlsd

@@ -82,19 +82,26 @@ class EdgeProfiler {
       return taps[i % 8 / 2][i / 8][filter][i % 2];
     }
   };
-  /// Eight rows: where their pixels and filters are, and what the filters answer.
+  /// Eight rows: where their pixels are, by which filters they are seen, and how far the true
+  /// positions are behind those of the filters.
   template <class T>
   struct Rows {
     std::array<const T*, kRows> pixels;
-    std::array<const Kernels*, kRows> kernels;
-    alignas(16) std::array<std::array<int32_t, 4>, kRows> sums;
+    std::array<int32_t, kRows> phases;
+    std::array<float, kRows> rounding_px;
   };
+  /// Kernels of all phases; scale: of the four integer sums.
+  template <class T>
+  using Measure = void (*)(const Rows<T>& rows,
+                           const Kernels* kernels,
+                           const std::array<float, 4>& scale,
+                           EdgeResponse* responses);
 
  private:
   template <class T>
   void measureTyped(const T* data,
                     const EdgeWindow& window,
-                    void (*sum_rows)(Rows<T>*),
+                    Measure<T> measure_rows,
                     const std::array<float, 4>& scale,
                     std::array<EdgeResponse, kRows>* responses) const;
 
@@ -103,8 +110,8 @@ class EdgeProfiler {
   alignas(16) std::array<float, 4> scale_;  // of integer sums of 8-bit pixels
   EdgeResponse white_noise_{}, ramp_{};
   std::array<float, kShapes> ratio_{}, narrow_gain_{}, wide_gain_{};
-  void (*sum_rows_8_)(Rows<uint8_t>*);
-  void (*sum_rows_16_)(Rows<uint16_t>*);
+  Measure<uint8_t> measure_8_;
+  Measure<uint16_t> measure_16_;
 };
 
 }  // namespace dlsd
