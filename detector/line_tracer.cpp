@@ -572,7 +572,7 @@ std::optional<TracedLine> LineTracer::trace(const PlanarPiece& piece,
       wide_level += std::abs(static_cast<double>(q.mean.odd_wide));
     }
   };
-  const uint32_t probes = std::min(kProbes, piece.nodes);
+  const uint32_t probes = piece.nodes < 5 ? 2 : kProbes;
   for (uint32_t i = 0; i < probes; ++i) probe((2 * i + 1) * piece.nodes / (2 * probes));
   const auto narrowSigmaPx = [&] {
     return static_cast<double>(count) * static_cast<double>(noise_.even_narrow) / level;
