@@ -6,12 +6,15 @@
 
 #include "detector/plane_curve.h"
 #include "detector/plane_fit.h"
+#include "detector/visible_arc.h"
 
 namespace dlsd {
 namespace {
 
 /// Nearer than this, two lines are one edge found twice, or cross.
 constexpr double kMinApartPx = 0.8;
+/// How much of the longer side must have a partner.
+constexpr double kMinCovered = 0.3;
 
 /// Whether a ray near the arc's plane is beside the arc itself, not the rest of the great circle.
 bool isBesideArc(const Arc& arc, const Eigen::Vector3d& ray) {
@@ -80,9 +83,17 @@ bool ThinBarMerger::mergeInto(DetectedLine* line,
   }
   const Eigen::Vector3d fitted =
       fit->normal.dot(normal) < 0 ? Eigen::Vector3d(-fit->normal) : fit->normal;
-  auto arc = arcOnPlane(fitted, from, to);
-  if (!arc) return false;
   const Camera& camera = rays_.camera();
+  const auto isSeen = [&](const Eigen::Vector3d& ray) {
+    const auto px = camera.project(ray);
+    return px && camera.inImage(*px);
+  };
+  // At the border, half way to a partner may be outside.
+  const auto on_plane = arcOnPlane(fitted, from, to);
+  if (!on_plane) return false;
+  const bool is_inside = isSeen(on_plane->from) && isSeen(on_plane->to);
+  auto arc = visibleArc(camera, fitted, from, on_plane->at(0.5), to, is_inside);
+  if (!arc) return false;
   const auto from_px = camera.project(arc->from), to_px = camera.project(arc->to);
   if (!from_px || !to_px || !camera.inImage(*from_px) || !camera.inImage(*to_px)) return false;
   const Eigen::Vector3d canonical = canonicalNormal(fitted);
@@ -137,7 +148,7 @@ void ThinBarMerger::merge(std::vector<DetectedLine>* lines) {
       (offset_px < 0 ? left_px : right_px) += (*lines)[i].length_px;
     }
     const std::vector<size_t>& partners = left_px > right_px ? left_ : right_;
-    if (!(std::max(left_px, right_px) >= 0.5 * line.length_px)) continue;
+    if (!(std::max(left_px, right_px) >= kMinCovered * line.length_px)) continue;
     if (!mergeInto(&line, *lines, partners)) continue;
     for (const size_t i : partners) gone_[i] = 1;
   }

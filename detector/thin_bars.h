@@ -14,9 +14,9 @@ class ThinBarMerger {
   explicit ThinBarMerger(const RayTable& rays) : rays_(rays) {}
 
   /// Two lines of opposite polarity that run at most kMaxApartPx apart beside each other (the
-  /// shorter side, in pieces or not, along at least half of the longer one) become one in the
-  /// middle between them, from the first to the last of the four ends. It keeps the longer one's
-  /// polarity, score, residuals and covariance. from_px and to_px must be set, and are.
+  /// shorter side, in pieces or not, along at least three tenths of the longer one) become one in
+  /// the middle between them, from the first to the last of the four ends. It keeps the longer
+  /// one's polarity, score, residuals and covariance. from_px and to_px must be set, and are.
   void merge(std::vector<DetectedLine>* lines);
 
   /// A bar of true width 2 px seems 2.9 px wide through optical blur 0.7 px.

@@ -77,6 +77,31 @@ TEST(ThinBars, OneLineUntilTheTwoSidesShow) {
   EXPECT_EQ(thick, 4 * 4 * 2);
 }
 
+// A bar that crosses the corner of the image is one line, too, though one side's ends, moved half
+// way to the other, lie outside.
+TEST(ThinBars, OneLineUpToTheBorder) {
+  const Camera camera = test::testCameras()[0].camera;
+  Detector detector(camera);
+  int bars = 0;
+  for (const double grey : {20.0, 230.0}) {
+    for (const double slope : {0.6, 1.0, 1.7}) {
+      const Vector2d from(-20, 100 + 20 * slope), to(100 / slope + 20, -20 * slope);
+      const Bar bar = barImage(camera, from, to, 1.5, grey);
+      const auto& lines = detector.detect(test::viewOf(bar.image, camera));
+      SCOPED_TRACE(testing::Message() << grey << " " << slope);
+      ASSERT_EQ(lines.size(), 1U);
+      ++bars;
+      for (const Vector2d& px : {lines[0].from_px, lines[0].to_px}) {
+        EXPECT_TRUE(camera.inImage(px));
+        EXPECT_LE(std::min(px.x(), px.y()), 2);
+        const Vector2d across = Vector2d(slope, 1).normalized();
+        EXPECT_NEAR(across.dot(px - from), 0, 0.25);
+      }
+    }
+  }
+  EXPECT_EQ(bars, 6);
+}
+
 // Two steps of the same sign 2.8 px apart are no bar, whatever they are.
 TEST(ThinBars, StairsAreNoBar) {
   const Camera camera = test::testCameras()[0].camera;
