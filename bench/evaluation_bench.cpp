@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "cameras/arc.h"
-#include "evaluation/evaluate.h"
+#include "evaluation/dataset_evaluation.h"
 #include "evaluation/figures.h"
 #include "evaluation/paper_experiment.h"
 #include "evaluation/summary.h"
@@ -26,6 +26,8 @@ FrameEvaluation randomFrame(const Camera& camera, uint64_t index) {
   };
   FrameEvaluation frame;
   frame.labels.camera = "cameras/wide.yaml";
+  frame.labels.width = camera.width();
+  frame.labels.height = camera.height();
   frame.labels.sensor = {{"psf_sigma_px", 0.7}, {"read_noise_levels", 2.0}, {"encoding", "linear"}};
   while (frame.labels.lines.size() < kLines) {
     const Eigen::Vector2d from = pixel();
@@ -58,23 +60,20 @@ FrameEvaluation randomFrame(const Camera& camera, uint64_t index) {
 
 void evaluateOneFrame(benchmark::State& state) {
   const Camera camera = paperCamera();
-  const FrameEvaluation frame = randomFrame(camera, 0);
-  const auto noise = imageNoise(frame.labels);
+  FrameEvaluation frame = randomFrame(camera, 0);
   for (auto _ : state) {
-    const FrameOutcome outcome =
-        evaluateFrame(camera, frame.labels.lines, frame.detections.lines, {}, noise);
-    benchmark::DoNotOptimize(outcome.labels.data());
+    evaluate(camera, {}, &frame);
+    benchmark::DoNotOptimize(frame.outcome.labels.data());
   }
 }
 BENCHMARK(evaluateOneFrame)->Unit(benchmark::kMillisecond);
 
 void figuresOf1000Frames(benchmark::State& state) {
   const Camera camera = paperCamera();
-  FrameEvaluation frame = randomFrame(camera, 0);
-  frame.outcome = evaluateFrame(
-      camera, frame.labels.lines, frame.detections.lines, {}, imageNoise(frame.labels));
   Summary summary{EvaluationOptions{}};
-  for (int i = 0; i < 1000; ++i) {
+  for (uint64_t i = 0; i < 1000; ++i) {
+    FrameEvaluation frame = randomFrame(camera, i);
+    evaluate(camera, {}, &frame);
     summary.add(frame, camera);
   }
   for (auto _ : state) {

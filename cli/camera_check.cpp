@@ -236,10 +236,8 @@ int run(const Arguments& arguments) {
     }
     for (size_t i = 0; i + 1 < images.size(); ++i) {
       if (images[i].bytes == images.back().bytes) {
-        throw InputError(
-            fmt::format("{}: is the same picture as {}, which would count twice",
-                        path,
-                        arguments.images[i]));
+        throw InputError(fmt::format(
+            "{}: is the same picture as {}, which would count twice", path, arguments.images[i]));
       }
     }
   }
@@ -291,6 +289,9 @@ int run(const Arguments& arguments) {
     std::vector<std::string> failures;
     if (!(trip.pixel_px.value <= arguments.max_px && trip.ray_px.value <= arguments.max_px)) {
       failures.push_back(fmt::format("the round trip is worse than {:g} px", arguments.max_px));
+    }
+    if (trip.with_ray == 0) {
+      failures.emplace_back("no pixel has a ray");
     }
     if (trip.broken > 0) {
       failures.emplace_back("rays do not return");

@@ -174,6 +174,13 @@ TEST_F(CameraCli, CheckGoesThroughEveryPixel) {
   EXPECT_EQ(result.err, "");
   EXPECT_THAT(result.out, HasSubstr("0/19200 0.00 %"));  // cam0 has a ray everywhere
   EXPECT_THAT(result.out, HasSubstr("passed: at most 1e-06 px"));
+  // A camera that sees nothing of what it should.
+  std::string aside = kWide;
+  aside.replace(aside.find("79.5, 59.5"), 10, "9000.0, 59.5");
+  write("aside.yaml", aside);
+  const Result nothing = dlsd("camera check aside.yaml");
+  EXPECT_EQ(nothing.code, 1);
+  EXPECT_EQ(nothing.err, "dlsd: aside.yaml (cam0): no pixel has a ray\n");
   const Result strict = dlsd("camera check rig.yaml:cam0 --max-px 0");
   EXPECT_EQ(strict.code, 1);
   EXPECT_EQ(strict.err, "dlsd: rig.yaml:cam0 (cam0): the round trip is worse than 0 px\n");

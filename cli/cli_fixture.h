@@ -55,10 +55,15 @@ struct Cli : ::testing::Test {
 
   /// Runs dlsd in the folder, `arguments` as typed into a shell.
   [[nodiscard]] Result dlsd(const std::string& arguments) const {
+    return shell("'" DLSD_BINARY "' " + arguments);
+  }
+
+  /// Runs a program in the folder, as typed into a shell.
+  [[nodiscard]] Result shell(const std::string& typed) const {
     const fs::path out = folder / ".stdout";
     const fs::path err = folder / ".stderr";
-    const std::string command = "cd '" + folder.string() + "' && '" DLSD_BINARY "' " + arguments +
-                                " >.stdout 2>.stderr </dev/null";
+    const std::string command =
+        "cd '" + folder.string() + "' && " + typed + " >.stdout 2>.stderr </dev/null";
     const int status = std::system(command.c_str());
     Result result{WIFEXITED(status) ? WEXITSTATUS(status) : -1, contentOf(out), contentOf(err)};
     fs::remove(out);

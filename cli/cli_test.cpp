@@ -6,6 +6,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
@@ -394,6 +395,8 @@ TEST_F(Cli, BadDataAndDetectionsAreTwo) {
                 2,
                 "./a cannot be started");
   expectRefused("evaluate --data data --timeout 5", 2, "--command");
+  expectRefused("evaluate --data data --command ''", 2, "--command");
+  expectRefused("evaluate --data data --data ./data/", 2, "data/: is given twice");
   expectRefused("evaluate --data data --detector lsd,dlsd,lsd", 2, "lsd twice");
   expectRefused("evaluate --data data --out x", 2, "--experiment");
   expectRefused("evaluate --data data --frames 7", 2, "--");
@@ -564,6 +567,46 @@ TEST_F(Cli, AnyonesProgramIsEvaluated) {
   EXPECT_EQ(all.at("detections"), "sh");
   EXPECT_EQ(all.at("all").at("detections"), 2);
   EXPECT_THAT(result.out, HasSubstr("\ntime ms "));
+}
+
+TEST_F(Cli, AnInterruptedEvaluationLeavesNothing) {
+  generate();
+  fs::create_directories(folder / "tmp");
+  const auto before = files();
+  for (const auto& [signal, code] : {std::pair{"INT", 130}, {"TERM", 143}}) {
+    for (const char* then : {"sleep 60", "echo {\\\"lines\\\": []} > {out}"}) {
+      // The program's parent is dlsd.
+      const std::string command =
+          std::string("sh -c 'kill -") + signal + " $PPID; " + then + "; exit; {image} {out}'";
+      std::string quoted;
+      for (const char c : command) {
+        quoted += c == '\'' ? std::string("'\\''") : std::string(1, c);
+      }
+      SCOPED_TRACE(quoted);
+      write("run.sh",
+            "TMPDIR=\"$PWD/tmp\" exec '" DLSD_BINARY
+            "' evaluate --data data --json e.json --report r --jobs 1 --command '" +
+                quoted + "'\n");
+      const auto start = std::chrono::steady_clock::now();
+      const Result result = shell("sh run.sh");
+      EXPECT_LE(std::chrono::steady_clock::now() - start, std::chrono::seconds(40));
+      fs::remove(folder / "run.sh");
+      EXPECT_EQ(result.code, code);
+      EXPECT_EQ(result.out, "");
+      EXPECT_EQ(result.err, "dlsd: interrupted: nothing is written\n");
+      EXPECT_EQ(files(), before);
+    }
+  }
+}
+
+TEST_F(Cli, WordsOfOtherProgramsDoNotSteerTheTerminal) {
+  generate();
+  expectRefused(
+      "evaluate --data data --command \"sh -c 'printf \\\"a\\\\033[31mred\\\\007\\\" >&2; exit 3; "
+      "{image} "
+      "{out}'\"",
+      2,
+      "code 3: a?[31mred?");
 }
 
 TEST_F(Cli, FilesProgramsAndDetectorsAreEvaluatedSideBySide) {

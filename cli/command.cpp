@@ -63,6 +63,9 @@ void print(std::string_view text) {
 void complain(std::string_view sentence) {
   std::string line(sentence);
   std::replace(line.begin(), line.end(), '\n', ' ');
+  // Names of files and words of other programs may hold what a terminal obeys.
+  std::replace_if(
+      line.begin(), line.end(), [](unsigned char c) { return c < ' ' || c == 0x7f; }, '?');
   tell("dlsd: " + line + "\n");
 }
 

@@ -35,7 +35,8 @@ Run addReplay(CLI::App& command);
 /// Writes to standard output and makes sure it arrived. Throws SystemError if it did not.
 void print(std::string_view text);
 
-/// One sentence on standard error: "dlsd: ...". Line breaks inside become spaces.
+/// One sentence on standard error: "dlsd: ...". Line breaks inside become spaces, other control
+/// characters question marks.
 void complain(std::string_view sentence);
 
 /// Text on standard error that is no complaint.

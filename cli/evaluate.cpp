@@ -71,9 +71,7 @@ Gate shareGate(const std::string& option,
               fmt::format("{} at rho = {:g} px", what, rho),
               [=](const Figures& figures) {
                 const Ratio ratio = figures.find(table, stratum, rho)->ratio.value();
-                return std::pair(
-                    ratio.total > 0 && double(ratio.counted) >= share * double(ratio.total),
-                    dlsd::text(ratio));
+                return std::pair(reaches(ratio, share), dlsd::text(ratio));
               }};
     }
   }
@@ -169,8 +167,18 @@ struct NamedSource {
   std::vector<DetectionSource> of_data;
 };
 
+constexpr std::string_view kNothingWritten = "nothing is written";
+
+/// The user's program, which ends when the user interrupts us.
+CommandOptions interruptible(const Arguments& arguments, const Interruption& interruption) {
+  CommandOptions command = arguments.command;
+  command.while_running = [&interruption] { interruption.check(kNothingWritten); };
+  return command;
+}
+
 std::vector<NamedSource> sourcesOf(const Arguments& arguments,
-                                   const std::deque<Dataset>& datasets) {
+                                   const std::deque<Dataset>& datasets,
+                                   const Interruption& interruption) {
   std::vector<NamedSource> sources;
   if (!arguments.detections.empty()) {
     if (arguments.detections.size() != datasets.size()) {
@@ -189,7 +197,8 @@ std::vector<NamedSource> sourcesOf(const Arguments& arguments,
     NamedSource& source = sources.emplace_back();
     source.name = nameOf(arguments.command);
     for (const Dataset& dataset : datasets) {
-      source.of_data.push_back(detectionsOfCommand(dataset, arguments.command, arguments.timed));
+      source.of_data.push_back(
+          detectionsOfCommand(dataset, interruptible(arguments, interruption), arguments.timed));
     }
   }
   for (const std::string& name : arguments.detectors) {
@@ -254,7 +263,14 @@ std::string paperData(const Arguments& arguments) {
   options.sensor.read_noise_levels = 2;
   options.jobs = arguments.jobs;
   Progress progress("frames made", size_t(options.count));
-  generateDataset(options, [&](const GenerateProgress& p) { progress.done(size_t(p.done)); });
+  const Interruption interruption;
+  generateDataset(options, [&](const GenerateProgress& p) {
+    progress.done(size_t(p.done));
+    if (p.done < p.total) {
+      interruption.check(fmt::format(
+          "{} of {} frames are made, the same command goes on from there", p.done, p.total));
+    }
+  });
   return options.out;
 }
 
@@ -275,6 +291,7 @@ int runExperiment(const Arguments& arguments) {
   }
   checkDetectors(names);
   const Dataset dataset(paperData(arguments));
+  const Interruption interruption;
   checkOutputs(filesOf(dataset), outputs);
   if (dataset.manifest().at("cameras").size() != 1) {
     throw InputError(fmt::format("{}: has {} cameras, the experiment is about one",
@@ -292,14 +309,17 @@ int runExperiment(const Arguments& arguments) {
 #endif
   }
   if (!arguments.command.command.empty()) {
-    detectors.push_back(
-        {nameOf(arguments.command), detectionsOfCommand(dataset, arguments.command, true), true});
+    detectors.push_back({nameOf(arguments.command),
+                         detectionsOfCommand(dataset, interruptible(arguments, interruption), true),
+                         true});
   }
   Experiment experiment;
   {
     Progress progress("frames", dataset.size());
-    experiment =
-        runPaperExperiment(dataset, detectors, view, [&](size_t done) { progress.done(done); });
+    experiment = runPaperExperiment(dataset, detectors, view, [&](size_t done) {
+      progress.done(done);
+      interruption.check(kNothingWritten);
+    });
   }
   writeExperiment(experiment, "The experiment of the D-LSD paper", arguments.out);
   print(table(experiment) + "\n" + outputs[0] + "\n");
@@ -338,12 +358,21 @@ int run(Arguments& arguments) {
   std::vector<std::string> inputs = arguments.detections;
   for (const std::string& folder : arguments.data) {
     const Dataset& dataset = datasets.emplace_back(folder);
+    for (const Dataset& other : datasets) {
+      std::error_code ignored;
+      if (&other != &dataset &&
+          std::filesystem::equivalent(other.folder(), dataset.folder(), ignored)) {
+        throw InputError(
+            fmt::format("--data {}: is given twice, its images would count twice", folder));
+      }
+    }
     for (std::string& file : filesOf(dataset)) {
       inputs.push_back(std::move(file));
     }
   }
   checkOutputs(inputs, outputs);
-  const std::vector<NamedSource> sources = sourcesOf(arguments, datasets);
+  const Interruption interruption;
+  const std::vector<NamedSource> sources = sourcesOf(arguments, datasets, interruption);
   // Two detectors at a time would make each other slow.
   const int jobs = arguments.timed && arguments.jobs == 0 ? 1 : arguments.jobs;
 
@@ -369,10 +398,12 @@ int run(Arguments& arguments) {
                 one.worst.add(frame, datasets[d]);
               }
               progress.done(one.summary.images.size());
+              interruption.check(kNothingWritten);
             });
       }
     }
     one.figures = makeFigures(one.summary);
+    interruption.check(kNothingWritten);
     text += fmt::format("{}== {} ==\n{}{}",
                         text.empty() ? "" : "\n",
                         one.name,
@@ -439,7 +470,8 @@ Run addEvaluate(CLI::App& command) {
                       arguments->command.command,
                       "Program to run on each image, with {image}, {out} and, if wanted, "
                       "{camera} where it gets the paths: it writes one JSON object to {out}")
-          ->type_name("'PROGRAM {image} {out}'");
+          ->type_name("'PROGRAM {image} {out}'")
+          ->check([](const std::string& text) { return text.empty() ? "is empty" : ""; });
   command.add_option("--timeout", arguments->command.timeout_s, "Seconds for one run of --command")
       ->type_name("S")
       ->capture_default_str()

@@ -11,15 +11,14 @@ namespace {
 
 constexpr uint64_t kStream = 0xb007;
 
-/// Linear between neighbours; `values` is sorted and not empty.
-double quantile(const std::vector<double>& values, double q) {
-  const double rank = q * double(values.size() - 1);
-  const auto below = size_t(rank);
-  const size_t above = std::min(below + 1, values.size() - 1);
-  return values[below] + (rank - double(below)) * (values[above] - values[below]);
-}
-
 }  // namespace
+
+double quantile(std::span<const double> sorted, double q) {
+  const double rank = q * double(sorted.size() - 1);
+  const auto below = size_t(rank);
+  const size_t above = std::min(below + 1, sorted.size() - 1);
+  return sorted[below] + (rank - double(below)) * (sorted[above] - sorted[below]);
+}
 
 Bootstrap::Bootstrap(size_t images, size_t resamples)
     : images_(images),

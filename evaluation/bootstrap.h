@@ -10,6 +10,9 @@
 
 namespace dlsd {
 
+/// Quantile q in [0, 1] of values that are sorted and not empty, linear between neighbours.
+[[nodiscard]] double quantile(std::span<const double> sorted, double q);
+
 struct Interval {
   double low = 0, high = 0;
   bool operator==(const Interval&) const = default;

@@ -109,6 +109,23 @@ std::array<StructuralOutcome, kStructuralKinds> structureOf(
 
 }  // namespace
 
+void evaluate(const Camera& camera, const EvaluationOptions& options, FrameEvaluation* frame) {
+  const LabelRecord& labels = frame->labels;
+  std::vector<DetectionLine>& lines = frame->detections.lines;
+  const std::vector<DetectionLine> given = options.bezier ? lines : std::vector<DetectionLine>{};
+  if (options.bezier) {
+    followBezier(lines);
+  }
+  frame->outcome = evaluateFrame(camera, labels.lines, lines, options, imageNoise(labels));
+  std::vector<StructuralCurve> curves;
+  for (size_t k = 0; k < lines.size(); ++k) {
+    curves.push_back(options.bezier
+                         ? structuralCurveOfBezier(given[k].points, labels.width, labels.height)
+                         : structuralCurve(lines[k].points, labels.width, labels.height));
+  }
+  frame->structure = structureOf(labels, curves, frame->outcome);
+}
+
 std::string cameraName(const LabelRecord& labels) {
   return std::filesystem::path(labels.camera).stem().string();
 }
@@ -137,24 +154,7 @@ void evaluateFrames(const Dataset& dataset,
     frame.labels = dataset.labels(i);
     try {
       frame.detections = detections(i, frame.labels);
-      std::vector<DetectionLine>& lines = frame.detections.lines;
-      const std::vector<DetectionLine> given =
-          options.bezier ? lines : std::vector<DetectionLine>{};
-      if (options.bezier) {
-        followBezier(lines);
-      }
-      frame.outcome = evaluateFrame(dataset.camera(frame.labels),
-                                    frame.labels.lines,
-                                    lines,
-                                    options,
-                                    imageNoise(frame.labels));
-      std::vector<StructuralCurve> curves;
-      const int width = frame.labels.width, height = frame.labels.height;
-      for (size_t k = 0; k < lines.size(); ++k) {
-        curves.push_back(options.bezier ? structuralCurveOfBezier(given[k].points, width, height)
-                                        : structuralCurve(lines[k].points, width, height));
-      }
-      frame.structure = structureOf(frame.labels, curves, frame.outcome);
+      evaluate(dataset.camera(frame.labels), options, &frame);
     } catch (const std::invalid_argument& error) {
       const std::string& given_by = frame.detections.source;
       throw InputError(fmt::format("{}{}{}/{}: {}",

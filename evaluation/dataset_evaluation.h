@@ -56,6 +56,11 @@ struct FrameEvaluation {
   std::array<StructuralOutcome, kStructuralKinds> structure;  ///< [StructuralKind]
 };
 
+/// Fills the outcome and the structure from the labels and the detections, whose points become
+/// those of their curves. Throws std::invalid_argument as evaluateFrame does, and with
+/// options.bezier for lines of fewer than 2 or more than 8 points.
+void evaluate(const Camera& camera, const EvaluationOptions& options, FrameEvaluation* frame);
+
 /// "wide" of "cameras/wide.yaml".
 [[nodiscard]] std::string cameraName(const LabelRecord& labels);
 

@@ -486,14 +486,23 @@ bool isCrowded(
   return false;
 }
 
-/// Whether a pixel lies within rho of the image of the infinite line behind a label.
+/// Whether a pixel lies within rho of the image of the infinite line behind a label. The image's
+/// tangent where the nearest ray of its plane arrives says how far: that place itself is not the
+/// nearest one where the scales along and across the line differ.
 bool onCarrier(const Camera& camera, const Vector3d& normal, const Vector2d& pixel, double rho_px) {
   const std::optional<Vector3d> ray = camera.unproject(pixel);
   if (!ray) {
     return false;
   }
-  const std::optional<Vector2d> foot = camera.project(*ray - normal.dot(*ray) * normal);
-  return foot && (*foot - pixel).norm() <= rho_px;
+  const Vector3d on_plane = *ray - normal.dot(*ray) * normal;
+  const std::optional<Vector2d> foot = camera.project(on_plane);
+  const std::optional<ProjectionJacobian> jacobian = camera.jacobian(on_plane);
+  if (!foot || !jacobian) {
+    return false;
+  }
+  const Vector2d tangent = *jacobian * normal.cross(on_plane);
+  const Vector2d away = pixel - *foot;
+  return std::abs(tangent.x() * away.y() - tangent.y() * away.x()) <= rho_px * tangent.norm();
 }
 
 /// What a carrier's labels say about one sample of a detection.
@@ -907,10 +916,11 @@ std::vector<bool> coveredByOne(const Camera& camera,
                                const std::vector<DetectionLine>& detections,
                                double rho_px,
                                double share) {
-  std::vector<Curve> curves;
+  std::vector<Curve> asked, curves;
   std::vector<int> order;
   Bounds bounds;
   for (size_t i = 0; i < lines.size(); ++i) {
+    asked.push_back(makeCurve(camera, lines[i].points, "line", i));
     for (const Vector2d& p : lines[i].points) {
       bounds.min = bounds.min.cwiseMin(p);
       bounds.max = bounds.max.cwiseMax(p);
@@ -927,8 +937,7 @@ std::vector<bool> coveredByOne(const Camera& camera,
   Counters near_detection(detections.size(), 1);
   Samples samples;
   std::vector<bool> covered;
-  for (size_t i = 0; i < lines.size(); ++i) {
-    const Curve line = makeCurve(camera, lines[i].points, "line", i);
+  for (const Curve& line : asked) {
     sampleBetween(line, 0, line.length(), samples);
     for (const Vector2d& p : samples.points) {
       forCurvesNear(grid, p, [&](int detection, double d2, double) {

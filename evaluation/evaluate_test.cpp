@@ -347,6 +347,31 @@ TEST_F(Evaluate, LongBridgeIsAMergeThatIsNotRight) {
   EXPECT_EQ(mergedAt(outcome, 0), kAlways);
 }
 
+TEST_F(Evaluate, ABridgesDistanceToItsCarrierIsThatInTheImage) {
+  // Near the corner of a wide image, where the ray of the carrier's plane that is nearest to a
+  // pixel's ray arrives 1.7 times as far away as the carrier's image is.
+  const Camera wide(Pinhole::fromParams({100, 100, 320, 240}), 640, 480);
+  const Vector2d middle(560, 420), along(std::cos(0.96), std::sin(0.96)),
+      across(-along.y(), along.x());
+  const auto at = [&](double s, double d) -> Vector2d { return middle + s * along + d * across; };
+  const std::vector<LabelLine> labels{label(wide, at(-60, 0), at(-20, 0), 0),
+                                      label(wide, at(20, 0), at(60, 0), 0)};
+  for (const double side : {-1.0, 1.0}) {
+    for (const auto& [share, merged] : {std::pair{0.9, kAlways}, {1.1, kNever}}) {
+      for (size_t r = 0; r < kOptions.rho_px.size(); ++r) {
+        const double d = side * share * kOptions.rho_px[r];
+        // On the labels it lies exactly; only the bridge is aside.
+        const FrameOutcome outcome = evaluateFrame(
+            wide,
+            labels,
+            {detection({at(-60, 0), at(-20, 0), at(-19.9, d), at(19.9, d), at(20, 0), at(60, 0)})},
+            kOptions);
+        EXPECT_EQ(mergedAt(outcome, 0)[r], merged[r]) << d;
+      }
+    }
+  }
+}
+
 TEST_F(Evaluate, DetourBetweenTwoSpansIsNoMerge) {
   const LabelLine next = label(camera, {400, 200}, {500, 200}, 0);
   const FrameOutcome outcome =

@@ -77,7 +77,7 @@ struct Ending {
 /// Runs words[0] and waits for it.
 Ending runProgram(const std::vector<std::string>& words,
                   const std::string& stderr_path,
-                  double timeout_s) {
+                  const CommandOptions& options) {
   std::vector<char*> arguments;
   for (const std::string& word : words) {
     arguments.push_back(const_cast<char*>(word.c_str()));
@@ -126,14 +126,26 @@ Ending runProgram(const std::vector<std::string>& words,
       ssize_t{sizeof ending.start_errno}) {
     ending.start_errno = 0;
   }
+  const auto killAll = [&] {
+    ::kill(-child, SIGKILL);
+    ::waitpid(child, &ending.status, 0);
+  };
   const double start_s = nowS();
   while (::waitpid(child, &ending.status, WNOHANG) == 0) {
     const double elapsed_s = nowS() - start_s;
-    if (elapsed_s > timeout_s) {
+    if (elapsed_s > options.timeout_s) {
       ending.timed_out = true;
-      ::kill(-child, SIGKILL);
-      ::waitpid(child, &ending.status, 0);
+      killAll();
       break;
+    }
+    try {
+      if (options.while_running) {
+        options.while_running();
+      }
+    } catch (...) {
+      killAll();
+      closeAll();
+      throw;
     }
     // Its time is measured to 1 %.
     std::this_thread::sleep_for(
@@ -229,7 +241,7 @@ DetectionSource detectionsOfCommand(const Dataset& dataset,
       fs::remove(out, ignored);
 
       const double start_s = nowS();
-      const Ending ending = runProgram(filled, errors, options.timeout_s);
+      const Ending ending = runProgram(filled, errors, options);
       const double time_ms = 1000 * (nowS() - start_s);
       const auto fail = [&](const std::string& what) {
         throw InputError(
@@ -251,7 +263,7 @@ DetectionSource detectionsOfCommand(const Dataset& dataset,
       if (WEXITSTATUS(ending.status) != 0) {
         fail(withStderr(fmt::format("ended with code {}", WEXITSTATUS(ending.status))));
       }
-      if (!fs::exists(out, ignored)) {
+      if (!fs::is_regular_file(out, ignored)) {  // a pipe or a device may never end
         fail("ended well, but wrote no file {out}");
       }
       nlohmann::json json;

@@ -1,6 +1,7 @@
 #pragma once
 // Anyone's detector, run as a program on one image after the other.
 
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -18,6 +19,9 @@ struct CommandOptions {
   /// the program writes and of the calibration file. {image} and {out} must be there.
   std::string command;
   double timeout_s = 60;  ///< For one image, in (0, 1e6].
+  /// If given, called every few ms while the program runs, by the thread that waits for it. What it
+  /// throws is thrown on, after the program and what it started are killed.
+  std::function<void()> while_running = {};
 };
 
 /// Runs a program for each image: it writes one JSON object to {out} as in docs/dataset-format.md

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <filesystem>
 #include <fstream>
+#include <stdexcept>
 
 #include "evaluation/hand_made.h"
 
@@ -140,6 +141,34 @@ TEST_F(ExternalCommand, AProgramThatHangsIsKilledWithWhatItStarted) {
     stat >> number >> name >> state;
   }
   EXPECT_THAT(state, testing::AnyOf("", "Z", "X"));
+}
+
+TEST_F(ExternalCommand, AnOutputThatNeverEndsIsNone) {
+  for (const char* script : {"mkfifo \"$2\"", "ln -s /dev/zero \"$2\"", "mkdir \"$2\""}) {
+    EXPECT_EQ(run(sh(script)).error,
+              folder / "data/images/000000.png: sh ended well, but wrote no file {out}")
+        << script;
+  }
+}
+
+TEST_F(ExternalCommand, WhoeverWaitsCanEndIt) {
+  const Dataset dataset(folder / "data");
+  const std::string seen = folder / "seen";
+  CommandOptions options{sh("dirname \"$2\" > \"" + seen + "\"; sleep 60"), 60};
+  options.while_running = [&] {
+    if (fs::exists(seen)) {
+      throw std::runtime_error("enough");
+    }
+  };
+  const auto start = std::chrono::steady_clock::now();
+  const auto evaluate = [&] {
+    evaluateFrames(dataset, detectionsOfCommand(dataset, options), {}, 1, [](FrameEvaluation&&) {});
+  };
+  EXPECT_THAT(evaluate, testing::ThrowsMessage<std::runtime_error>("enough"));
+  EXPECT_LE(std::chrono::steady_clock::now() - start, std::chrono::seconds(30));
+  std::string scratch;
+  std::getline(std::ifstream(seen) >> std::ws, scratch);
+  EXPECT_FALSE(fs::exists(scratch)) << scratch;
 }
 
 TEST_F(ExternalCommand, NothingIsLeftBehind) {

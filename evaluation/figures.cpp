@@ -5,7 +5,9 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <numeric>
 #include <set>
+#include <tuple>
 #include <utility>
 
 namespace dlsd {
@@ -159,17 +161,41 @@ std::optional<double> quantile(std::vector<double>& values, double q) {
     return std::nullopt;
   }
   std::sort(values.begin(), values.end());
-  const double rank = q * double(values.size() - 1);
-  const auto below = size_t(rank);
-  const size_t above = std::min(below + 1, values.size() - 1);
-  return values[below] + (rank - double(below)) * (values[above] - values[below]);
+  return dlsd::quantile(values, q);
+}
+
+/// The same whatever their order: sorts them first.
+std::optional<double> rms(std::vector<double>& values) {
+  if (values.empty()) {
+    return std::nullopt;
+  }
+  std::sort(values.begin(), values.end());
+  double sum2 = 0;
+  for (const double value : values) {
+    sum2 += value * value;
+  }
+  return std::sqrt(sum2 / double(values.size()));
 }
 
 /// Builds the list.
 class Maker {
  public:
   explicit Maker(const Summary& summary)
-      : summary_(summary), rhos_(summary.options.rho_px), bootstrap_(summary.images.size()) {}
+      : summary_(summary), rhos_(summary.options.rho_px), bootstrap_(summary.images.size()) {
+    for (const LabelRow& row : summary_.labels) {
+      if (row.errors && stratumOf(row.conditions) == Stratum::kHeadline) {
+        with_errors_.push_back(&row);
+      }
+    }
+    // Sums of floating-point numbers depend on their order: take one that labels can't change.
+    const auto key = [](const LabelRow* row) {
+      const LabelErrors& e = *row->errors;
+      return std::tuple(row->image, e.sum_px, e.sum2_px2, e.sum_rad, e.sum2_rad2);
+    };
+    std::sort(with_errors_.begin(), with_errors_.end(), [&](const auto* a, const auto* b) {
+      return key(a) < key(b);
+    });
+  }
 
   Figures make() {
     counts();
@@ -343,16 +369,6 @@ class Maker {
     }
   }
 
-  /// Headline labels that were found at the largest rho.
-  template <class F>
-  void forErrors(F&& f) const {
-    for (const LabelRow& row : summary_.labels) {
-      if (row.errors && stratumOf(row.conditions) == Stratum::kHeadline) {
-        f(row, *row.errors);
-      }
-    }
-  }
-
   void value(const std::string& table,
              const std::string& stratum,
              long samples,
@@ -393,14 +409,15 @@ class Maker {
   void localisation() {
     const size_t n = summary_.images.size();
     PerImage px(n), px2(n), count(n), mrad(n), mrad2(n), angle_count(n);
-    forErrors([&](const LabelRow& row, const LabelErrors& errors) {
-      px[row.image] += errors.sum_px;
-      px2[row.image] += errors.sum2_px2;
-      count[row.image] += double(errors.samples);
-      mrad[row.image] += 1e3 * errors.sum_rad;
-      mrad2[row.image] += 1e6 * errors.sum2_rad2;
-      angle_count[row.image] += double(errors.angle_samples);
-    });
+    for (const LabelRow* row : with_errors_) {
+      const LabelErrors& errors = *row->errors;
+      px[row->image] += errors.sum_px;
+      px2[row->image] += errors.sum2_px2;
+      count[row->image] += double(errors.samples);
+      mrad[row->image] += 1e3 * errors.sum_rad;
+      mrad2[row->image] += 1e6 * errors.sum2_rad2;
+      angle_count[row->image] += double(errors.angle_samples);
+    }
     meanAndRms("localisation", "px", px, px2, count);
     const DistanceStats& stats = summary_.all.localisation[size_t(Stratum::kHeadline)];
     value("localisation", "p95 px", stats.count, stats.quantile(0.95));
@@ -420,25 +437,27 @@ class Maker {
 
   void ends() {
     std::vector<double> along, along_size, across;
-    double sum = 0, across2 = 0;
-    forErrors([&](const LabelRow&, const LabelErrors& errors) {
-      for (const std::optional<EndError>& end : errors.ends) {
+    for (const LabelRow* row : with_errors_) {
+      for (const std::optional<EndError>& end : row->errors->ends) {
         if (end) {
-          sum += end->along_px;
-          across2 += end->across_px * end->across_px;
           along.push_back(end->along_px);
           along_size.push_back(std::abs(end->along_px));
           across.push_back(end->across_px);
         }
       }
-    });
+    }
     const auto n = long(along.size());
-    value("end points", "along, mean px", n, sum / double(n));
-    value("end points", "along, median px", n, quantile(along, 0.5));
+    const std::optional<double> across_p95 = quantile(across, 0.95);  // sorts, as sums need it
+    const std::optional<double> along_median = quantile(along, 0.5);
+    value("end points",
+          "along, mean px",
+          n,
+          std::accumulate(along.begin(), along.end(), 0.0) / double(n));
+    value("end points", "along, median px", n, along_median);
     value("end points", "along, median of size px", n, quantile(along_size, 0.5));
     value("end points", "along, p95 of size px", n, quantile(along_size, 0.95));
-    value("end points", "across, rms px", n, std::sqrt(across2 / double(n)));
-    value("end points", "across, p95 px", n, quantile(across, 0.95));
+    value("end points", "across, rms px", n, rms(across));
+    value("end points", "across, p95 px", n, across_p95);
   }
 
   void normals() {
@@ -447,47 +466,42 @@ class Maker {
         bins<LabelRow>({10, 20, 40}, [](const LabelRow& row) { return row.angle_rad * kDegrees; });
     parts.push_back({"all", all});
     for (const Part<LabelRow>& part : parts) {
-      std::vector<double> deg, offset, roll;
-      double deg2 = 0, offset2 = 0, roll2 = 0, angle2 = 0, bound2 = 0;
-      forErrors([&](const LabelRow& row, const LabelErrors& errors) {
-        if (!part.holds(row)) {
-          return;
+      std::vector<double> deg, offset, roll, angle, bound_deg;
+      for (const LabelRow* row : with_errors_) {
+        if (!part.holds(*row)) {
+          continue;
         }
-        if (errors.normal_rad) {
-          deg.push_back(*errors.normal_rad * kDegrees);
-          deg2 += deg.back() * deg.back();
+        if (row->errors->normal_rad) {
+          deg.push_back(*row->errors->normal_rad * kDegrees);
         }
-        if (errors.normal_sigmas) {
-          const NormalErrorInSigmas& sigmas = *errors.normal_sigmas;
-          offset.push_back(sigmas.offset);
-          roll.push_back(sigmas.roll);
-          offset2 += sigmas.offset * sigmas.offset;
-          roll2 += sigmas.roll * sigmas.roll;
-          angle2 += sigmas.angle * sigmas.angle;
-          bound2 += sigmas.bound_rad * kDegrees * sigmas.bound_rad * kDegrees;
+        if (const std::optional<NormalErrorInSigmas>& sigmas = row->errors->normal_sigmas) {
+          offset.push_back(sigmas->offset);
+          roll.push_back(sigmas->roll);
+          angle.push_back(sigmas->angle);
+          bound_deg.push_back(sigmas->bound_rad * kDegrees);
         }
-      });
+      }
       if (part.name == "all") {
         logHistogram(deg);
       }
       const std::string length = part.name == "all" ? part.name : "length " + part.name + " deg";
       const auto n = long(deg.size());
       value("normal deg", length + ", median", n, quantile(deg, 0.5));
-      value("normal deg", length + ", rms", n, std::sqrt(deg2 / double(n)));
+      value("normal deg", length + ", rms", n, rms(deg));
       value("normal deg", length + ", p95", n, quantile(deg, 0.95));
       const auto m = long(offset.size());
-      value("normal bound", length + ", bound rms deg", m, std::sqrt(bound2 / double(m)));
-      const auto relative = [&](const std::string& what, std::vector<double>& sigmas, double sum2) {
-        value("normal over bound", length + ", " + what + ", rms", m, std::sqrt(sum2 / double(m)));
+      value("normal bound", length + ", bound rms deg", m, rms(bound_deg));
+      const auto relative = [&](const std::string& what, std::vector<double>& sigmas) {
+        value("normal over bound", length + ", " + what + ", rms", m, rms(sigmas));
         const std::optional<double> median = quantile(sigmas, 0.5);
         value("normal over bound",
               length + ", " + what + ", median",
               m,
               median ? std::optional(*median / kNormalMedian) : std::nullopt);
       };
-      relative("offset", offset, offset2);
-      relative("roll", roll, roll2);
-      value("normal over bound", length + ", angle, rms", m, std::sqrt(angle2 / double(m)));
+      relative("offset", offset);
+      relative("roll", roll);
+      value("normal over bound", length + ", angle, rms", m, rms(angle));
     }
   }
 
@@ -581,6 +595,8 @@ class Maker {
   }
 
   const Summary& summary_;
+  /// Headline labels that were found at the largest rho.
+  std::vector<const LabelRow*> with_errors_;
   const std::vector<double>& rhos_;
   Bootstrap bootstrap_;
   Figures figures_;

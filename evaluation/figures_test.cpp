@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "evaluation/hand_made.h"
@@ -76,6 +77,36 @@ TEST(Figures, CountsAndF) {
   const double sigma = std::sqrt(0.75 * 0.25 / 20);
   EXPECT_NEAR(found->interval->low, 0.75 - 1.96 * sigma, 0.06);
   EXPECT_NEAR(found->interval->high, 0.75 + 1.96 * sigma, 0.06);
+}
+
+TEST(Figures, OrderAndDirectionDoNotMatterToTheLastBit) {
+  const Camera camera = pinholeCamera();
+  std::vector<LabelLine> labels;
+  std::vector<DetectionLine> detections;
+  for (int i = 0; i < 12; ++i) {
+    const double y = 20 + 38 * i;
+    labels.push_back(label(camera, {100.0 + i, y}, {300.0 + 7 * i, y + 11}, i));
+    detections.push_back(shifted(labels.back(), {1.3 * std::sin(i), 1.7 * std::cos(3 * i)}));
+  }
+  const auto figuresOf = [&] {
+    Summary summary{EvaluationOptions{}};
+    const nlohmann::ordered_json sensor{
+        {"psf_sigma_px", 0.5}, {"read_noise_levels", 2}, {"encoding", "linear"}, {"bits", 8}};
+    summary.add(frame("cam", camera, labels, detections, sensor), camera);
+    return toJson(makeFigures(summary)).dump(1);
+  };
+  const std::string as_made = figuresOf();
+  EXPECT_THAT(as_made, testing::HasSubstr("offset, rms"));
+  std::reverse(detections.begin(), detections.end());
+  for (DetectionLine& line : detections) {
+    line = hand_made::reversed(line);
+  }
+  EXPECT_EQ(figuresOf(), as_made);
+  for (size_t shift = 1; shift < labels.size(); shift += 2) {
+    std::rotate(labels.begin(), labels.begin() + long(shift), labels.end());
+    std::reverse(labels[shift].points.begin(), labels[shift].points.end());
+    EXPECT_EQ(figuresOf(), as_made) << shift;
+  }
 }
 
 TEST(Figures, StrataHoldTheOtherConditionsOfTheHeadline) {

@@ -69,17 +69,20 @@ inline DetectionLine reversed(DetectionLine line) {
   return line;
 }
 
-/// A frame evaluated as evaluateFrames does, but for sAP.
+/// A frame evaluated as evaluateFrames does.
 inline FrameEvaluation frame(const std::string& camera_name,
                              const Camera& camera,
                              const std::vector<LabelLine>& labels,
-                             const std::vector<DetectionLine>& detections) {
+                             const std::vector<DetectionLine>& detections,
+                             nlohmann::ordered_json sensor = nlohmann::ordered_json::object()) {
   FrameEvaluation result;
   result.labels.camera = "cameras/" + camera_name + ".yaml";
   result.labels.lines = labels;
-  result.labels.sensor = nlohmann::ordered_json::object();
+  result.labels.width = camera.width();
+  result.labels.height = camera.height();
+  result.labels.sensor = std::move(sensor);
   result.detections.lines = detections;
-  result.outcome = evaluateFrame(camera, labels, detections, EvaluationOptions{});
+  evaluate(camera, {}, &result);
   return result;
 }
 

@@ -66,13 +66,12 @@ MeanAndDeviation meanOf(const std::vector<double>& values) {
 FrameFacts factsOf(const LabelRecord& labels,
                    const Camera& camera,
                    const std::vector<std::vector<DetectionLine>>& lines,
+                   const std::vector<FrameOutcome>& outcomes,
                    const std::vector<ExperimentDetector>& detectors,
                    const std::optional<VirtualView>& view) {
-  EvaluationOptions options;
-  options.rho_px.assign(kPaperRhosPx.begin(), kPaperRhosPx.end());
   FrameFacts facts;
   for (size_t d = 0; d < detectors.size(); ++d) {
-    const FrameOutcome outcome = evaluateFrame(camera, labels.lines, lines[d], options);
+    const FrameOutcome& outcome = outcomes[d];
     if (d == 0) {
       for (size_t i = 0; i < labels.lines.size(); ++i) {
         const LabelConditions& conditions = outcome.conditions[i];
@@ -361,6 +360,8 @@ Experiment runPaperExperiment(const Dataset& dataset,
                               const std::vector<ExperimentDetector>& detectors,
                               const std::optional<VirtualView>& view,
                               const std::function<void(size_t done)>& on_progress) {
+  EvaluationOptions options;
+  options.rho_px.assign(kPaperRhosPx.begin(), kPaperRhosPx.end());
   Experiment experiment;
   std::vector<FrameDetections> run;
   for (const ExperimentDetector& detector : detectors) {
@@ -373,9 +374,17 @@ Experiment runPaperExperiment(const Dataset& dataset,
   std::vector<FrameFacts> frames;
   for (size_t i = 0; i < dataset.size(); ++i) {
     const LabelRecord labels = dataset.labels(i);
+    const Camera& camera = dataset.camera(labels);
     std::vector<std::vector<DetectionLine>> lines;
+    std::vector<FrameOutcome> outcomes;
     for (size_t d = 0; d < detectors.size(); ++d) {
       Detections detections = run[d](i, labels);
+      try {
+        outcomes.push_back(evaluateFrame(camera, labels.lines, detections.lines, options));
+      } catch (const std::invalid_argument& error) {
+        throw InputError(fmt::format(
+            "{}: {}/{}: {}", detectors[d].name, dataset.folder(), labels.image, error.what()));
+      }
       if (detections.time_ms) {
         detection_ms[d].push_back(*detections.time_ms);
       }
@@ -384,7 +393,7 @@ Experiment runPaperExperiment(const Dataset& dataset,
       }
       lines.push_back(std::move(detections.lines));
     }
-    frames.push_back(factsOf(labels, dataset.camera(labels), lines, detectors, view));
+    frames.push_back(factsOf(labels, camera, lines, outcomes, detectors, view));
     if (on_progress) {
       on_progress(i + 1);
     }

@@ -106,6 +106,21 @@ TEST_F(PaperExperimentTest, LabelsOutsideTheRectifiedViewAreToldApart) {
   EXPECT_EQ(all.detectors[0].found_in_view[1], (Ratio{0, 3}));
 }
 
+TEST_F(PaperExperimentTest, LinesThatAreNoneNameDetectorAndImage) {
+  writeDataset(folder / "data", {{wide}});
+  const Dataset dataset(folder / "data");
+  const DetectionLine point = hand_made::detection({{100, 400}, {100, 400}});
+  const auto run_both = [&] {
+    (void)runPaperExperiment(dataset,
+                             {detector("ours", true, {}, 1), detector("peer", false, {point}, 1)},
+                             std::nullopt,
+                             {});
+  };
+  EXPECT_THAT(run_both,
+              testing::ThrowsMessage<InputError>(
+                  "peer: " + (folder / "data/images/000000.png: detection 0 has no length")));
+}
+
 TEST_F(PaperExperimentTest, TextAndFiles) {
   const Experiment experiment = run();
   const std::string text = table(experiment);

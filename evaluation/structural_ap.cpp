@@ -128,21 +128,22 @@ double StructuralAp::averagePrecision(size_t threshold, std::span<const uint8_t>
     return 0;
   }
   // Precision where recall rises; between two rises it only falls, which the envelope never sees.
+  // Detections of one score come in together: their order is chance.
   struct Step {
     double gained, precision;
   };
   std::vector<Step> steps;
-  double right = 0, all = 0;
-  for (const Entry& entry : entries_) {
+  double right = 0, all = 0, gained = 0;
+  for (size_t i = 0; i < entries_.size(); ++i) {
+    const Entry& entry = entries_[i];
     const double weight = weights.empty() ? 1 : weights[entry.image];
     const StructuralMatch match = entry.matches[threshold];
-    if (weight == 0 || match == StructuralMatch::kIgnored) {
-      continue;
-    }
-    all += weight;
-    if (match == StructuralMatch::kTrue) {
-      right += weight;
-      steps.push_back({weight, right / all});
+    all += match == StructuralMatch::kIgnored ? 0 : weight;
+    gained += match == StructuralMatch::kTrue ? weight : 0;
+    if (gained > 0 && (i + 1 == entries_.size() || entries_[i + 1].score != entry.score)) {
+      right += gained;
+      steps.push_back({gained, right / all});
+      gained = 0;
     }
   }
   double area = 0, envelope = 0;

@@ -66,7 +66,7 @@ struct StructuralOutcome {
                                                const std::vector<double>& scores,
                                                bool chord);
 
-/// The detections of many images, in descending score; among equals in the order of the images.
+/// The detections of many images, in descending score; those of one score come in together.
 class StructuralAp {
  public:
   explicit StructuralAp(std::span<const StructuralOutcome> images);

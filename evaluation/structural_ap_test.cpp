@@ -122,6 +122,20 @@ TEST(StructuralAp, EnvelopeOfAKnownSequence) {
   EXPECT_NEAR(StructuralAp(images).averagePrecision(0, weights), (1 + 2.0 / 3) / 2, 1e-12);
 }
 
+TEST(StructuralAp, DetectionsOfOneScoreComeInTogether) {
+  const StructuralCurve a = line({10, 20}, {70, 20}), b = line({10, 50}, {70, 80}),
+                        nowhere = line({100, 100}, {120, 120});
+  const std::vector<std::vector<StructuralCurve>> orders{{a, nowhere, b}, {nowhere, b, a}};
+  for (const auto& detections : orders) {
+    EXPECT_NEAR(ap({match({a, b}, detections, {1, 1, 1})}, 0), 2.0 / 3, 1e-12);
+  }
+  // Over images, too.
+  const StructuralOutcome all_false = match({a}, {nowhere, nowhere}, {1, 1});
+  const StructuralOutcome all_true = match({a}, {a}, {1});
+  EXPECT_NEAR(ap({all_true, all_false}, 0), 0.5 / 3, 1e-12);
+  EXPECT_NEAR(ap({all_false, all_true}, 0), 0.5 / 3, 1e-12);
+}
+
 TEST(StructuralAp, LabelsThatDoNotCountTakeTheirDetectionsAway) {
   const StructuralCurve a = line({10, 20}, {70, 20}), faint = line({10, 50}, {70, 80});
   const StructuralOutcome outcome =
@@ -181,10 +195,12 @@ double bruteForceAp(const std::vector<std::vector<StructuralCurve>>& labels,
       hits.begin(), hits.end(), [](const Hit& a, const Hit& b) { return a.score > b.score; });
   std::vector<double> recall{0}, precision{0};
   double tp = 0, fp = 0;
-  for (const Hit& hit : hits) {
-    (hit.is_true ? tp : fp) += 1;
-    recall.push_back(tp / total);
-    precision.push_back(tp / (tp + fp));
+  for (size_t i = 0; i < hits.size(); ++i) {
+    (hits[i].is_true ? tp : fp) += 1;
+    if (i + 1 == hits.size() || hits[i + 1].score < hits[i].score) {
+      recall.push_back(tp / total);
+      precision.push_back(tp / (tp + fp));
+    }
   }
   recall.push_back(1);
   precision.push_back(0);

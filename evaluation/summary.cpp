@@ -177,6 +177,11 @@ std::string text(const Ratio& ratio) {
                      100 * double(ratio.counted) / double(ratio.total));
 }
 
+bool reaches(const Ratio& ratio, double share) {
+  // The quotient is rounded as the number that was typed is; share * total would be another number.
+  return ratio.total > 0 && double(ratio.counted) / double(ratio.total) >= share;
+}
+
 std::string table(const Summary& summary) {
   const EvaluationOptions& options = summary.options;
   std::vector<const GroupSummary*> groups;

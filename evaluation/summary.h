@@ -74,6 +74,10 @@ struct Summary {
 /// "123/140  87.9 %"; "0/0" has no share.
 [[nodiscard]] std::string text(const Ratio& ratio);
 
+/// Whether counted / total >= share; 0/0 is not. 11/20 reaches 0.55, whose nearest double is a bit
+/// above it.
+[[nodiscard]] bool reaches(const Ratio& ratio, double share);
+
 /// The counts and distances of each camera and all, ending in a newline.
 [[nodiscard]] std::string table(const Summary& summary);
 

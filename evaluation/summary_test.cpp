@@ -80,6 +80,17 @@ TEST(Summary, TableShowsCountedAndTotal) {
   EXPECT_EQ(dlsd::text(Ratio{0, 0}), "0/0");
 }
 
+TEST(Summary, AShareThatIsReachedExactlyIsReached) {
+  for (int total : {1, 2, 5, 10, 20, 25, 50, 100, 1000, 10000}) {
+    for (int counted = 0; counted <= total; ++counted) {
+      const double share = counted * (10000 / total) / 10000.0;  // as typed with four decimals
+      ASSERT_TRUE(reaches({counted, total}, share)) << counted << "/" << total;
+      ASSERT_FALSE(reaches({counted - 1, total}, share)) << counted << "/" << total;
+    }
+  }
+  EXPECT_FALSE(reaches({0, 0}, 0));
+}
+
 TEST(Summary, JsonHoldsTheSameFigures) {
   const Summary summary = exampleSummary();
   const auto json = toJson(summary);

@@ -9,7 +9,7 @@ namespace dlsd {
 namespace {
 
 constexpr double kWidth = 460, kHeight = 300;
-constexpr double kLeft = 56, kRight = 14, kTop = 34, kBottom = 48;
+constexpr double kLeft = 56, kRight = 20, kTop = 34, kBottom = 48;
 
 /// About five round numbers that cover [from, to].
 std::vector<double> ticks(const PlotAxis& axis) {
@@ -267,7 +267,7 @@ const std::string_view kPlotStyle = R"css(
 }
 .s0 { --c: var(--s0); } .s1 { --c: var(--s1); } .s2 { --c: var(--s2); } .s3 { --c: var(--s3); }
 .s4 { --c: var(--s4); } .s5 { --c: var(--s5); } .s6 { --c: var(--s6); } .s7 { --c: var(--s7); }
-.plots { display: grid; grid-template-columns: repeat(auto-fill, minmax(400px, 1fr)); gap: 14px; margin-top: 10px; }
+.plots { display: grid; grid-template-columns: repeat(auto-fill, minmax(min(400px, 100%), 1fr)); gap: 14px; margin-top: 10px; }
 .plot { display: block; width: 100%; height: auto; background: var(--card); border: 1px solid var(--line); border-radius: 8px; font: 12px system-ui, sans-serif; }
 .plot text { fill: var(--dim); } .plot .plot-title { fill: var(--text); font-weight: 600; font-size: 13px; }
 .plot .grid { stroke: var(--line); stroke-width: 1; } .plot .axis { stroke: var(--dim); stroke-width: 1; }

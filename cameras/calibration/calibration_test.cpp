@@ -205,11 +205,14 @@ TEST_F(Calibration, FilesThatAreNoCamchainAreRefused) {
   EXPECT_THAT(refusal("cam0: 5\n"), HasSubstr("cam0 must be a map"));
   EXPECT_THAT(refusal("cam0: [1, 2]\n"), HasSubstr("cam0 must be a map"));
   EXPECT_THAT(refusal("cam0:\n"), HasSubstr("cam0 must be a map"));
-  EXPECT_THAT(refusal("cam0:\n  [1]: 2\n"), HasSubstr("plain word"));
+  EXPECT_THAT(refusal("cam0:\n  [1]: 2\n"), HasSubstr("line 2, column 3: a list, a map"));
   EXPECT_THAT(refusal(entryWith() + "---\n" + entryWith()),
               HasSubstr("more than one YAML document"));
   EXPECT_THAT(refusal("cam0: {camera_model: pinhole"), HasSubstr("line 1, column"));
   EXPECT_THAT(refusal("cam0:\n\t- x: [}"), HasSubstr("YAML"));
+  // JSON that ends too early, as yaml-cpp sees it.
+  EXPECT_THAT(refusal("{\"value0\":\n {\"intrinsics\": [{\"camera_type\": \"ucm\""),
+              AllOf(HasSubstr("line "), HasSubstr("column ")));
   EXPECT_FALSE(refusal(std::string(100'000, '[')).empty());
   EXPECT_THAT(refusal("cam0: " + std::string(40, '[') + std::string(40, ']')),
               HasSubstr("deeper than 32 levels"));

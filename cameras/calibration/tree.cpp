@@ -19,6 +19,12 @@ void TreeBuilder::fail(const std::string& problem) const {
   throw InputError(source_ + ": " + problem);
 }
 
+void TreeBuilder::refuseKey() const {
+  fail("line " + std::to_string(line_) + ", column " + std::to_string(column_) +
+       ": a list, a map or nothing stands where a key is expected, which is a plain word (or a "
+       "bracket is not closed)");
+}
+
 std::string TreeBuilder::place(std::string_view key) const {
   std::string text;
   for (const Open& open : open_) {
@@ -48,7 +54,7 @@ void TreeBuilder::scalar(std::string_view text, bool quoted) {
 
 void TreeBuilder::begin(Node::Kind kind, bool opencv_matrix) {
   if (!open_.empty() && open_.back().node.isMap() && !open_.back().has_key) {
-    fail("has a key that is not a plain word");
+    refuseKey();
   }
   if (open_.size() >= kMaxDepth) {
     fail("is nested deeper than " + std::to_string(kMaxDepth) +
@@ -89,7 +95,7 @@ void TreeBuilder::add(Node node) {
   }
   Open& parent = open_.back();
   if (parent.node.isMap()) {
-    if (!parent.has_key) fail("has a key that is not a plain word");
+    if (!parent.has_key) refuseKey();
     parent.node.keys.push_back(std::move(parent.key));
     parent.has_key = false;
   }

@@ -37,6 +37,11 @@ class TreeBuilder {
  public:
   explicit TreeBuilder(std::string source) : source_(std::move(source)) {}
 
+  /// Where the next event stands in the text, both from 1.
+  void at(int line, int column) {
+    line_ = line;
+    column_ = column;
+  }
   void null() { add(Node{}); }
   void scalar(std::string_view text, bool quoted);
   void beginList() { begin(Node::Kind::kList, false); }
@@ -55,12 +60,14 @@ class TreeBuilder {
   };
   void begin(Node::Kind kind, bool opencv_matrix);
   void add(Node node);
+  [[noreturn]] void refuseKey() const;
   [[nodiscard]] std::string place(std::string_view key) const;
 
   std::string source_;
   std::vector<Open> open_;
   Node root_;
   size_t nodes_ = 0;
+  int line_ = 1, column_ = 1;
 };
 
 /// Exactly one document of YAML, or of JSON, which is read as the YAML that it is.

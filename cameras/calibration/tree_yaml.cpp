@@ -24,7 +24,9 @@ class Receiver : public YAML::EventHandler {
   void OnNull(const YAML::Mark& mark, YAML::anchor_t anchor) override {
     refuseAnchor(mark, anchor);
     // An empty document after the first: `rostopic echo` ends each message by ---.
-    if (documents_ == 1) builder_->null();
+    if (documents_ > 1) return;
+    enter(mark);
+    builder_->null();
   }
   void OnAlias(const YAML::Mark& mark, YAML::anchor_t /*anchor*/) override {
     refuseAnchor(mark, 1);
@@ -43,6 +45,7 @@ class Receiver : public YAML::EventHandler {
                        YAML::EmitterStyle::value /*style*/) override {
     refuseSecondDocument();
     refuseAnchor(mark, anchor);
+    enter(mark);
     builder_->beginList();
   }
   void OnSequenceEnd() override { builder_->end(); }
@@ -52,11 +55,13 @@ class Receiver : public YAML::EventHandler {
                   YAML::EmitterStyle::value /*style*/) override {
     refuseSecondDocument();
     refuseAnchor(mark, anchor);
+    enter(mark);
     builder_->beginMap(tag.ends_with("opencv-matrix"));
   }
   void OnMapEnd() override { builder_->end(); }
 
  private:
+  void enter(const YAML::Mark& mark) { builder_->at(mark.line + 1, mark.column + 1); }
   void refuseSecondDocument() const {
     if (documents_ > 1) builder_->fail("holds more than one YAML document, allowed is one");
   }
