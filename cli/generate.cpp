@@ -31,6 +31,7 @@ struct Arguments {
   std::vector<std::string> planes;
   std::string verify;
   std::string config;
+  std::vector<std::string> settings;
   bool print_config = false;
   CameraVariety camera_variety;
   GenerateOptions options;
@@ -114,6 +115,9 @@ int run(Arguments& arguments) {
   if (!arguments.config.empty()) {
     readVariety(arguments.config, &options.variety, &arguments.camera_variety);
   }
+  for (const std::string& setting : arguments.settings) {
+    setVariety(setting, &options.variety, &arguments.camera_variety);
+  }
   if (arguments.print_config) {
     const nlohmann::ordered_json config{{"scene", toJson(options.variety)},
                                         {"camera", toJson(arguments.camera_variety)}};
@@ -187,6 +191,13 @@ Run addGenerate(CLI::App& command) {
                   arguments->config,
                   "JSON file of ranges that scenes and random cameras are drawn from")
       ->type_name("FILE");
+  command
+      .add_option("--set",
+                  arguments->settings,
+                  "One of these ranges, as --print-config names it: clutter=4,12; may be repeated")
+      ->type_name("NAME=LOW,HIGH")
+      ->expected(1)
+      ->take_all();
   command.add_flag(
       "--print-config", arguments->print_config, "Print these ranges and do nothing else");
   command
@@ -273,6 +284,8 @@ Run addGenerate(CLI::App& command) {
       "  dlsd generate --camera random:kb:50 --config ranges.json --scene corridor --count 500 "
       "--out "
       "data\n"
+      "  dlsd generate --camera wide.yaml --scene polyhedra --set distractors=2,6 --set wood=0.3 "
+      "--out data\n"
       "  dlsd generate --camera wide.yaml --planes depth,normal,df --out data\n"
       "  dlsd generate --camera wide.yaml --count 1000 --shard 0/4 --out data   (and 1/4, 2/4, "
       "3/4)\n"

@@ -24,6 +24,7 @@
 #include "synth/labels.h"
 #include "synth/render.h"
 #include "synth/shadows.h"
+#include "synth/tubes.h"
 #include "synth/variety.h"
 #include "synth/visibility_oracle.h"
 
@@ -42,7 +43,7 @@ struct Case {
 };
 void showValue(const Case& c, std::ostream& out) {
   out << c.preset << " seed " << c.seed << " index " << c.index
-      << (c.distractors ? " with round things" : "");
+      << (c.distractors ? " with things on top" : "");
 }
 
 rc::Gen<Case> genCase() {
@@ -62,16 +63,17 @@ SceneView makeView(const Case& c) {
   SceneView view = makeSceneView(c.preset, c.seed, c.index);
   if (c.distractors) {
     SceneVariety variety;
-    variety.distractors = {2, 5};
+    variety.distractors = {3, 8};
+    variety.clutter = {0, 5};
     addVariety(variety, c.seed, c.index, &view);
   }
   return view;
 }
 
-/// A realistic camera of any model, of at most 0.3 megapixels.
-rc::Gen<Camera> genSmallCamera() {
+/// A realistic camera of any model, by default of at most 0.3 megapixels.
+rc::Gen<Camera> genSmallCamera(VarietyRange width_px = {320, 560}) {
   CameraVariety variety;
-  variety.width_px = {320, 560};
+  variety.width_px = width_px;
   return rc::gen::map(rc::gen::tuple(rc::gen::elementOf(randomCameraModels()), genInt(0, 100000)),
                       [variety](const auto& t) {
                         return drawCamera(
@@ -89,6 +91,7 @@ struct Viewed {
 
   Viewed(Scene s, const Pose& p, const Camera& camera)
       : scene(std::move(s)), pose(p), raycaster(scene) {
+    addRodSides(pose.position_in_world, &scene);
     addShadowEdges(raycaster, &scene);
     spans = visibleSpans(scene, raycaster, camera, pose);
     const Shader shader(scene, &raycaster);
@@ -103,6 +106,14 @@ struct Viewed {
         .radiance;
   }
 };
+
+/// Whether the label is the middle of a bar or of its shadow.
+bool isMiddle(const Scene& scene, const LabelLine& line) {
+  const Edge& edge = scene.edges[static_cast<size_t>(line.edge)];
+  return edge.source == EdgeSource::kRodCentre ||
+         (edge.source == EdgeSource::kShadow &&
+          scene.edges[static_cast<size_t>(edge.caster)].source == EdgeSource::kRodCentre);
+}
 
 bool isInner(EndKind kind) {
   return kind == EndKind::kVertex || kind == EndKind::kOccluder;
@@ -125,10 +136,51 @@ double distanceTo(const std::vector<Vector2d>& curve, const Vector2d& p) {
   return nearest;
 }
 
+/// What the picture shows at a place, by rays alone.
+class Eye {
+ public:
+  Eye(const Viewed& seen, const Camera& camera)
+      : seen_(seen),
+        camera_(camera),
+        shader_(seen.scene, &seen.raycaster),
+        world_from_cam_(seen.pose.cam_from_world.transpose()) {}
+
+  struct Look {
+    HitKind kind = HitKind::kNothing;
+    int index = -1;
+    Sight sight = -1;
+    double grey = 0;
+    [[nodiscard]] bool isSame(const Look& o) const {
+      return kind == o.kind && index == o.index && sight == o.sight;
+    }
+  };
+  [[nodiscard]] Look along(const Vector3d& ray) const {
+    const Vector3d direction = world_from_cam_ * ray.normalized();
+    const Eigen::Vector3f d = direction.cast<float>();
+    const Vector3d& origin = seen_.pose.position_in_world;
+    const Hit hit =
+        seen_.raycaster.cast(origin.cast<float>(), d, 0, std::numeric_limits<float>::infinity());
+    Sight sight = shader_.surfaceAt(hit, origin, direction);
+    shader_.addShadows(&hit, origin, &d.x(), &d.y(), &d.z(), 1, &sight);
+    const double radiance = static_cast<double>(shader_.radiance(hit, origin, direction, sight));
+    return {hit.kind, hit.index, sight, greyLevel(SensorOptions(), radiance)};
+  }
+  [[nodiscard]] std::optional<Look> at(const Vector2d& pixel) const {
+    const auto ray = camera_.unproject(pixel);
+    return ray ? std::optional(along(*ray)) : std::nullopt;
+  }
+
+ private:
+  const Viewed& seen_;
+  const Camera& camera_;
+  Shader shader_;
+  Eigen::Matrix3d world_from_cam_;
+};
+
 // --- Properties ---
 
-// 2e-5 rad off to both sides of a label's curve there are different surfaces (1e-4 rad: light and
-// shadow); 2e-4 rad off, grey levels differ by its least contrast.
+// 2e-5 rad off to both sides of a label's curve there are different surfaces, or light and shadow;
+// 2e-4 rad off, grey levels differ by its least contrast.
 TEST(SynthSuite, LabelsLieOnDiscontinuities) {
   Worst worst("share of points of labels that are no borders");
   holds(1, [&] {
@@ -136,29 +188,10 @@ TEST(SynthSuite, LabelsLieOnDiscontinuities) {
     const Camera camera = *genSmallCamera();
     SceneView view = makeView(c);
     const Viewed seen(std::move(view.scene), view.pose, camera);
-    const Shader shader(seen.scene, &seen.raycaster);
-    const Eigen::Matrix3d world_from_cam = seen.pose.cam_from_world.transpose();
-    struct Look {
-      int surface;
-      double grey;
-    };
-    const auto lookAlong = [&](const Vector3d& ray) -> Look {
-      const Vector3d direction = world_from_cam * ray.normalized();
-      const Hit hit = seen.raycaster.cast(seen.pose.position_in_world.cast<float>(),
-                                          direction.cast<float>(),
-                                          0,
-                                          std::numeric_limits<float>::infinity());
-      const Seen place = shader.shade(hit, seen.pose.position_in_world, direction);
-      return {place.surface, greyLevel(SensorOptions(), static_cast<double>(place.radiance))};
-    };
+    const Eye eye(seen, camera);
     int checked = 0, flat = 0;
     for (const LabelLine& line : seen.labels.lines) {
-      const Edge& edge = seen.scene.edges[static_cast<size_t>(line.edge)];
-      const bool is_middle =
-          edge.source == EdgeSource::kRodCentre ||
-          (edge.source == EdgeSource::kShadow &&
-           seen.scene.edges[static_cast<size_t>(edge.caster)].source == EdgeSource::kRodCentre);
-      if (is_middle || line.contrast_min < 3) continue;
+      if (isMiddle(seen.scene, line) || line.contrast_min < 3) continue;
       // One of the places at which contrast is stated, through the image.
       const Vector3d from = line.points_in_cam[0].normalized();
       const Vector3d side = from.cross(line.points_in_cam[1]).normalized().cross(from);
@@ -169,17 +202,11 @@ TEST(SynthSuite, LabelsLieOnDiscontinuities) {
       const auto ray = camera.unproject(*p);
       RC_ASSERT(ray.has_value());
       ++checked;
-      const auto difference = [&](double beside_rad, bool* same_surface) {
-        const Look a = lookAlong(*ray + beside_rad * line.normal);
-        const Look b = lookAlong(*ray - beside_rad * line.normal);
-        *same_surface = a.surface == b.surface;
-        return std::abs(a.grey - b.grey);
+      const auto look = [&](double beside_rad) {
+        return eye.along(*ray + beside_rad * line.normal);
       };
-      bool same_nearby = false, same = false;
-      (void)difference(kNearbyRad, &same_nearby);
-      const double step = difference(kBesideRad, &same);
-      // Light and shadow are the same surface; the step tells them apart.
-      const bool is_border = line.kind == LineKind::kShadow || !same_nearby;
+      const bool is_border = !look(kNearbyRad).isSame(look(-kNearbyRad));
+      const double step = std::abs(look(kBesideRad).grey - look(-kBesideRad).grey);
       if (is_border && step >= 0.95 * line.contrast_min - 0.5) continue;
       ++flat;
       RC_LOG() << "line " << line.id << " " << toString(line.kind) << " at " << p->transpose()
@@ -195,7 +222,7 @@ TEST(SynthSuite, LabelsLieOnDiscontinuities) {
   });
 }
 
-// A point of an edge is in a span if and only if brute force over all triangles, balls and discs
+// A point of an edge is in a span if and only if brute force over all triangles and round things
 // finds nothing before it.
 TEST(SynthSuite, VisibilityIsThatOfBruteForce) {
   holds(1, [] {
@@ -237,6 +264,189 @@ TEST(SynthSuite, VisibilityIsThatOfBruteForce) {
   });
 }
 
+// --- Completeness ---
+
+/// Things by square cells of the image.
+template <class T>
+class ImageGrid {
+ public:
+  ImageGrid(const Camera& camera, int cell)
+      : cell_(cell),
+        columns_(camera.width() / cell + 1),
+        rows_(camera.height() / cell + 1),
+        cells_(static_cast<size_t>(columns_) * static_cast<size_t>(rows_)) {}
+
+  /// Calls function(list) for all cells within `reach` of the box.
+  template <class Function>
+  void forEachCell(const Vector2d& lo, const Vector2d& hi, double reach, const Function& function) {
+    const auto clamped = [&](double x, int count) {
+      return std::clamp(static_cast<int>(std::floor((x + 0.5) / cell_)), 0, count - 1);
+    };
+    for (int j = clamped(lo.y() - reach, rows_); j <= clamped(hi.y() + reach, rows_); ++j) {
+      for (int i = clamped(lo.x() - reach, columns_); i <= clamped(hi.x() + reach, columns_); ++i) {
+        function(cells_[static_cast<size_t>(j * columns_ + i)]);
+      }
+    }
+  }
+
+ private:
+  int cell_, columns_, rows_;
+  std::vector<std::vector<T>> cells_;
+};
+
+/// A place where the picture jumps.
+struct Jump {
+  Vector2d pixel;
+  Vector3d ray;
+  double step;
+};
+
+/// All places on the lines between neighbouring pixels' centres where what is seen changes by more
+/// than `least_step` grey levels, to 1e-5 px.
+std::vector<Jump> findJumps(const Eye& eye, const Camera& camera, double least_step) {
+  std::vector<Jump> jumps;
+  const auto search = [&](const Vector2d& from, const Eye::Look& here, const Vector2d& to) {
+    double lo = 0, hi = 1;
+    Eye::Look beyond;
+    for (int k = 0; k < 17; ++k) {
+      const double middle = (lo + hi) / 2;
+      const auto look = eye.at(from + middle * (to - from));
+      if (look && look->isSame(here)) {
+        lo = middle;
+      } else {
+        hi = middle;
+        if (!look) return;
+        beyond = *look;
+      }
+    }
+    if (hi == 1) return;  // Right at the other pixel.
+    const Vector2d pixel = from + lo * (to - from);
+    const auto ray = camera.unproject(pixel);
+    const auto before = eye.at(pixel);
+    if (!ray || !before || std::abs(before->grey - beyond.grey) <= least_step) return;
+    jumps.push_back({pixel, *ray, std::abs(before->grey - beyond.grey)});
+  };
+  std::vector<std::optional<Eye::Look>> above(static_cast<size_t>(camera.width()));
+  for (int y = 0; y < camera.height(); ++y) {
+    std::optional<Eye::Look> left;
+    for (int x = 0; x < camera.width(); ++x) {
+      const Vector2d pixel(x, y);
+      const auto look = eye.at(pixel);
+      auto& up = above[static_cast<size_t>(x)];
+      for (const auto& [other, step] : {std::pair(left, Vector2d(1, 0)), {up, Vector2d(0, 1)}}) {
+        if (!look || !other || look->isSame(*other)) continue;
+        // From both sides: something thin may be in between.
+        search(pixel - step, *other, pixel);
+        search(pixel, *look, pixel - step);
+      }
+      left = up = look;
+    }
+  }
+  return jumps;
+}
+
+/// Straight in space, that is: in one plane through the camera, to kStraightPx.
+constexpr double kStraightPx = 1e-3;
+constexpr double kLongPx = 20;
+
+/// The longest straight run of jumps, its length and its ends.
+struct Run {
+  double length_px = 0;
+  Vector2d from{0, 0}, to{0, 0};
+};
+Run longestStraightRun(const Camera& camera, const std::vector<Jump>& jumps) {
+  ImageGrid<size_t> grid(camera, 16);
+  for (size_t k = 0; k < jumps.size(); ++k) {
+    grid.forEachCell(jumps[k].pixel, jumps[k].pixel, 0, [&](auto& list) { list.push_back(k); });
+  }
+  Run longest;
+  std::vector<std::pair<double, size_t>> along;
+  for (const Jump& a : jumps) {
+    const auto J = camera.jacobian(a.ray);
+    if (!J) continue;
+    const double straight_rad = kStraightPx / J->norm();
+    std::vector<size_t> near;
+    grid.forEachCell(a.pixel, a.pixel, 24, [&](auto& list) {
+      near.insert(near.end(), list.begin(), list.end());
+    });
+    for (const size_t k : near) {
+      const double apart = (jumps[k].pixel - a.pixel).norm();
+      if (!(apart > 9 && apart < 10.5)) continue;
+      const Vector3d normal = a.ray.cross(jumps[k].ray).normalized();
+      const Vector3d across = normal.cross(a.ray);
+      along.clear();
+      for (const size_t i : near) {
+        const Vector3d& ray = jumps[i].ray;
+        if (std::abs(normal.dot(ray)) > straight_rad) continue;
+        along.emplace_back(std::atan2(ray.dot(across), ray.dot(a.ray)), i);
+      }
+      std::sort(along.begin(), along.end());
+      for (size_t first = 0; first < along.size();) {
+        size_t last = first;
+        while (last + 1 < along.size() &&
+               (jumps[along[last + 1].second].pixel - jumps[along[last].second].pixel).norm() <
+                   1.5) {
+          ++last;
+        }
+        const Vector2d &from = jumps[along[first].second].pixel,
+                       &to = jumps[along[last].second].pixel;
+        if ((to - from).norm() > longest.length_px) longest = {(to - from).norm(), from, to};
+        first = last + 1;
+      }
+    }
+  }
+  return longest;
+}
+
+// Every straight border in the picture of more than 5 grey levels and 20 px belongs to a label.
+// Borders are found by rays between neighbouring pixels, without the scene's edges.
+TEST(SynthSuite, LabelsAreComplete) {
+  Worst worst("px, longest straight border without a label");
+  holds(1, [&] {
+    const Case c = *genCase();
+    const Camera camera = *genSmallCamera({200, 320});
+    SceneView view = makeView(c);
+    const Viewed seen(std::move(view.scene), view.pose, camera);
+    const Eye eye(seen, camera);
+    const std::vector<Jump> jumps = findJumps(eye, camera, 5);
+    // Labels' pieces, each with how far from it its borders may be: thin bars have theirs in their
+    // middle.
+    struct Piece {
+      Vector2d from, to;
+      double reach;
+    };
+    constexpr double kOnLabelPx = 0.02, kInBarPx = kThickRodPx / 2 + 0.1;
+    ImageGrid<Piece> pieces(camera, 8);
+    for (const LabelLine& line : seen.labels.lines) {
+      const bool is_bar = isMiddle(seen.scene, line);
+      for (size_t i = 1; i < line.points.size(); ++i) {
+        const Vector2d &a = line.points[i - 1], &b = line.points[i];
+        pieces.forEachCell(a.cwiseMin(b), a.cwiseMax(b), 2, [&](auto& list) {
+          list.push_back({a, b, is_bar ? kInBarPx : kOnLabelPx});
+        });
+      }
+    }
+    std::vector<Jump> unexplained;
+    for (const Jump& jump : jumps) {
+      bool explained = false;
+      pieces.forEachCell(jump.pixel, jump.pixel, 0, [&](const auto& list) {
+        for (const Piece& piece : list) {
+          explained = explained || distanceTo({piece.from, piece.to}, jump.pixel) <= piece.reach;
+        }
+      });
+      if (!explained) unexplained.push_back(jump);
+    }
+    const Run run = longestStraightRun(camera, unexplained);
+    RC_LOG() << jumps.size() << " jumps, " << unexplained.size() << " without a label; longest run "
+             << run.length_px << " px from " << run.from.transpose() << " to "
+             << run.to.transpose();
+    RC_TAG(c.preset);
+    RC_PRE(!jumps.empty());
+    worst.see(run.length_px);
+    RC_ASSERT(run.length_px < kLongPx);
+  });
+}
+
 // What two cameras of one pose both see entirely are the same arcs.
 TEST(SynthSuite, ArcsAreThoseOfAnotherLens) {
   Worst worst("difference of span ends, rad");
@@ -245,6 +455,7 @@ TEST(SynthSuite, ArcsAreThoseOfAnotherLens) {
     const Camera one = *genSmallCamera(), other = *genSmallCamera();
     SceneView view = makeView(c);
     const Raycaster raycaster(view.scene);
+    addRodSides(view.pose.position_in_world, &view.scene);
     addShadowEdges(raycaster, &view.scene);
     std::multimap<int, const EdgeSpan*> by_edge;
     const auto spans = visibleSpans(view.scene, raycaster, one, view.pose);
@@ -290,6 +501,9 @@ struct WorldMap {
     for (Disc& d : scene.discs) {
       d.centre = (*this)(d.centre);
       d.normal = (*this)(d.normal);
+    }
+    for (Tube& tube : scene.tubes) {
+      for (Vector3d* v : {&tube.centre, &tube.x, &tube.y}) *v = (*this)(*v);
     }
     for (Rod& r : scene.rods) {
       r.from = (*this)(r.from);

@@ -33,6 +33,7 @@
 #include "synth/scene.h"
 #include "synth/shading.h"
 #include "synth/shadows.h"
+#include "synth/tubes.h"
 
 namespace dlsd {
 namespace {
@@ -121,6 +122,7 @@ Frame makeFrame(const GenerateOptions& options,
   SceneView view = makeSceneView(options.scene, options.seed, index);
   addVariety(options.variety, options.seed, index, &view);
   const Raycaster raycaster(view.scene);
+  addRodSides(view.pose.position_in_world, &view.scene);
   addShadowEdges(raycaster, &view.scene);
   const Shader shader(view.scene, &raycaster);
   const std::vector<EdgeSpan> spans = visibleSpans(view.scene, raycaster, camera, view.pose);

@@ -11,6 +11,7 @@
 #include "cameras/mutant.h"
 #include "synth/dataset/statistics.h"
 #include "synth/shadows.h"
+#include "synth/tubes.h"
 
 namespace dlsd {
 namespace {
@@ -156,6 +157,21 @@ class Events {
     if (!DLSD_MUTANT("label-disc")) addDirection(foot - along);
   }
 
+  /// In the camera frame.
+  void addTube(const Tube& tube) {
+    const double middle = arc_.angle / 2;
+    // Angles from the arc's middle: they jump behind the camera, where the arc is not.
+    const auto covered = [&](const Eigen::Vector3d& c) -> std::array<double, 2> {
+      const double x = arc_.arc.from.dot(c), y = arc_.side.dot(c);
+      const double rest2 = c.squaredNorm() - tube.radius * tube.radius;
+      const double ratio = std::sqrt(std::max(0.0, rest2)) / std::hypot(x, y);
+      const double at = std::remainder(std::atan2(y, x) - middle, 2 * M_PI);
+      const double half = std::acos(std::min(1.0, ratio));
+      return {at - half, at + half};
+    };
+    addTubeEvents(tube, arc_.normal, 0, covered, [&](double phi) { addPhi(phi + middle); });
+  }
+
   /// Sorted angles inside (lo, hi), with both ends.
   [[nodiscard]] std::vector<double> cuts(double lo, double hi) {
     std::sort(phis_.begin(), phis_.end());
@@ -191,16 +207,22 @@ class View {
       case EdgeSource::kFaces:
         return height(edge.face0) > -kInPlane || height(edge.face1) > -kInPlane;
       case EdgeSource::kDecal:
-      case EdgeSource::kShadow:
         return height(edge.face0) > 0;
+      case EdgeSource::kShadow: {
+        const LitPlane plane = litPlaneOf(scene_, edge);
+        return plane.normal.dot(pose_.position_in_world - plane.origin) > 0;
+      }
       case EdgeSource::kRodCentre:
         return true;
+      case EdgeSource::kRodSide:
+        return edge.light < 0;
     }
     return false;
   }
 
   /// The edge may hide others: its two faces look different ways.
   [[nodiscard]] bool isOutline(const Edge& edge) const {
+    if (edge.source == EdgeSource::kRodSide) return edge.light < 0;
     if (edge.source != EdgeSource::kFaces) return false;
     const double h0 = height(edge.face0), h1 = height(edge.face1);
     return std::min(h0, h1) < kInPlane && std::max(h0, h1) > -kInPlane;
@@ -222,7 +244,7 @@ class View {
     for (;;) {
       const Hit hit = raycaster_.cast(pose_.position_in_world.cast<float>(), direction, begin, end);
       if (hit.kind == HitKind::kNothing) return false;
-      if (hit.kind != HitKind::kFace || !mayLookThrough(hit.index, edge)) return true;
+      if (!mayLookThrough(hit, edge)) return true;
       begin = std::max(hit.distance * (1 + 1e-6F),
                        std::nextafter(hit.distance, std::numeric_limits<float>::infinity()));
       if (!(begin < end)) return false;
@@ -232,12 +254,13 @@ class View {
  private:
   [[nodiscard]] double height(int face) const { return height_[static_cast<size_t>(face)]; }
 
-  [[nodiscard]] bool mayLookThrough(int face, const Edge& edge) const {
-    if (edge.source == EdgeSource::kRodCentre) {
-      const Rod& rod = scene_.rods[static_cast<size_t>(edge.rod)];
-      if (face >= rod.first_face && face < rod.first_face + rod.face_count) return true;
-    }
-    return contains(face, edge);
+  /// A rod does not hide its centre line, nor a cylinder its outline.
+  [[nodiscard]] bool mayLookThrough(const Hit& hit, const Edge& edge) const {
+    const bool of_rod =
+        edge.source == EdgeSource::kRodCentre || edge.source == EdgeSource::kRodSide;
+    if (of_rod && isOnRod(hit, scene_, edge.rod)) return true;
+    if (hit.kind == HitKind::kDisc) return hit.index == edge.disc;
+    return hit.kind == HitKind::kFace && contains(hit.index, edge);
   }
 
   const Scene& scene_;
@@ -295,7 +318,7 @@ std::optional<std::array<Eigen::Vector3d, 2>> shadowSides(const Scene& scene,
                                                           const Eigen::Vector3d& point) {
   const Light& light = scene.lights[static_cast<size_t>(middle.light)];
   const Edge& caster = scene.edges[static_cast<size_t>(middle.caster)];
-  const Face& face = scene.faces[static_cast<size_t>(middle.face0)];
+  const LitPlane plane = litPlaneOf(scene, middle);
   const Eigen::Vector3d d = caster.to - caster.from;
   const Eigen::Vector3d ray =
       light.kind == Light::Kind::kSun ? light.place : Eigen::Vector3d(light.place - point);
@@ -306,7 +329,7 @@ std::optional<std::array<Eigen::Vector3d, 2>> shadowSides(const Scene& scene,
   std::array<Eigen::Vector3d, 2> sides;
   for (size_t k = 0; k < 2; ++k) {
     const auto side =
-        shadowOnFace(light, caster.from + s * d + (k == 0 ? radius : -radius) * normal, face);
+        shadowOnPlane(light, caster.from + s * d + (k == 0 ? radius : -radius) * normal, plane);
     if (!side) return std::nullopt;
     sides[k] = pose.toCam(*side);
   }
@@ -350,10 +373,10 @@ void atWidthPoints(const Camera& camera,
   }
 }
 
-/// Shadows of a rod, by (rod, light, face), that are labelled by their middle in this view.
-using StripeKey = std::array<int, 3>;
+/// Shadows of a rod, by (rod, light, face, disc), that are labelled by their middle in this view.
+using StripeKey = std::array<int, 4>;
 StripeKey stripeKey(const Edge& edge) {
-  return {edge.rod, edge.light, edge.face0};
+  return {edge.rod, edge.light, edge.face0, edge.disc};
 }
 std::set<StripeKey> findThinShadows(const Scene& scene, const Camera& camera, const Pose& pose) {
   std::map<StripeKey, double> widest;
@@ -418,6 +441,22 @@ std::vector<EdgeSpan> visibleSpans(const Scene& scene,
     if (!imaged.empty()) candidates.push_back({*arc, std::move(imaged)});
   }
 
+  // Tubes in the camera frame, in balls.
+  struct SeenTube {
+    Tube tube;
+    Eigen::Vector3d direction;
+    double angle;  ///< Radius of its ball.
+  };
+  std::vector<SeenTube> tubes;
+  for (const Tube& tube : scene.tubes) {
+    const Tube turned = transformed(tube, pose.cam_from_world, pose.position_in_world);
+    const double radius = turned.x.norm() + turned.y.norm() + turned.radius;
+    const double distance = turned.centre.norm();
+    tubes.push_back({turned,
+                     turned.centre.normalized(),
+                     distance > radius ? std::asin(radius / distance) : M_PI});
+  }
+
   std::vector<EdgeSpan> spans;
   for (const Candidate& candidate : candidates) {
     const EdgeArc& arc = candidate.arc;
@@ -441,6 +480,10 @@ std::vector<EdgeSpan> visibleSpans(const Scene& scene,
       events.addDisc(pose.toCam(disc.centre.cast<double>()),
                      pose.cam_from_world * disc.normal.cast<double>(),
                      static_cast<double>(disc.radius));
+    }
+    for (const SeenTube& tube : tubes) {
+      const double apart = std::acos(std::clamp(arc.middle.dot(tube.direction), -1.0, 1.0));
+      if (apart <= arc.angle / 2 + tube.angle + 1e-6) events.addTube(tube.tube);
     }
     for (const ImageSpan& imaged : candidate.imaged) {
       const std::vector<double> cuts = events.cuts(imaged.t0 * arc.angle, imaged.t1 * arc.angle);
@@ -574,6 +617,8 @@ Labels makeLabels(const Scene& scene,
       line.kind = LineKind::kShadow;
     } else if (edge.source == EdgeSource::kDecal) {
       line.kind = LineKind::kMaterial;
+    } else if (edge.source == EdgeSource::kRodSide) {
+      line.kind = LineKind::kSilhouette;
     } else {
       const bool both = view.looksAtCamera(edge.face0) && view.looksAtCamera(edge.face1);
       line.kind =

@@ -4,9 +4,10 @@
 //
 // An edge is an arc of a great circle of directions. Its visibility can only change where the arc
 // crosses the arc of an edge that is an outline from here (one of its two faces looks at the
-// camera), the outline of a sphere or disc, or enters a sphere. These directions are computed in
-// closed form; between two neighbours one ray test decides. So no occluder is too thin to be seen,
-// and span ends are as exact as double arithmetic on the float-rounded vertices.
+// camera, or it is a cylinder's side), the outline of a sphere, disc or tube, or enters a sphere.
+// These directions are computed in closed form (tubes: to rounding, tubes.h); between two
+// neighbours one ray test decides. So no occluder is too thin to be seen, and span ends are as
+// exact as double arithmetic on the float-rounded vertices.
 
 #include <vector>
 
@@ -36,7 +37,8 @@ struct EdgeSpan {
 };
 
 /// All visible spans of all edges, in order of edges; of rods both the centre line and the edges of
-/// the prism. Edges that look away (all their faces seen from behind) have none.
+/// the prism or sides of the cylinder. Edges that look away (all their faces seen from behind) have
+/// none. The scene's edges hold the sides of cylinders as seen from here (addRodSides, tubes.h).
 [[nodiscard]] std::vector<EdgeSpan> visibleSpans(const Scene& scene,
                                                  const Raycaster& raycaster,
                                                  const Camera& camera,
@@ -57,7 +59,7 @@ struct Labels {
 /// Kind: decal borders are `material`, centre lines `wire`, borders of shadows `shadow` (present if
 /// the scene's edges hold them, see shadows.h). An edge of two faces is `crease` if
 /// both look at the camera, or where both sides of it in the image show faces that contain it (its
-/// own and the surface on which the solid stands), else `silhouette`.
+/// own and the surface on which the solid stands), else `silhouette`, as are sides of cylinders.
 ///
 /// Contrast: |difference| of grey levels before noise and blur, after exposure and encoding,
 /// between rays 2e-4 rad to both sides, at 11 points spread evenly over the span. For wires:

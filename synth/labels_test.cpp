@@ -12,6 +12,8 @@
 #include "synth/render.h"
 #include "synth/scene_builder.h"
 #include "synth/test_cameras.h"
+#include "synth/tubes.h"
+#include "synth/variety.h"
 #include "synth/visibility_oracle.h"
 
 namespace dlsd {
@@ -106,6 +108,56 @@ TEST(VisibleSpans, EndWhereBruteForceSaysSo) {
   // Where an outline meets the edge under a tiny angle, or two occluders hand over, 3e-6 rad along
   // the edge is nothing across it.
   EXPECT_GE(static_cast<double>(exact), 0.99 * static_cast<double>(ends));
+}
+
+// The same for scenes full of rings, strings and cylinders.
+TEST(VisibleSpans, EndBehindTubesAndCylinders) {
+  size_t ends = 0, round_ends = 0, wrong = 0, sides = 0;
+  constexpr double kStep = 1e-7;
+  SceneVariety variety;
+  variety.distractors = {30, 30};
+  variety.distractor_kinds = {"ring", "string", "cylinder"};
+  for (const auto& [name, camera] : testCameras()) {
+    SceneView view = makeSceneView("polyhedra", 7, ends);
+    addVariety(variety, 7, ends, &view);
+    addRodSides(view.pose.position_in_world, &view.scene);
+    const Raycaster raycaster(view.scene);
+    const VisibilityOracle oracle(view.scene, view.pose.position_in_world);
+    Scene bare = view.scene;
+    bare.tubes.clear();
+    for (Rod& rod : bare.rods) rod.surface = -1;
+    bare.discs.clear();
+    const VisibilityOracle without(bare, view.pose.position_in_world);
+    for (const EdgeSpan& span : visibleSpans(view.scene, raycaster, camera, view.pose)) {
+      const Edge& edge = view.scene.edges[static_cast<size_t>(span.edge)];
+      sides += edge.source == EdgeSource::kRodSide ? 1 : 0;
+      if (span.phi1 - span.phi0 < 20 * kStep) continue;
+      const auto pointAt = [&](double phi) -> Vector3d {
+        const Vector3d d =
+            view.pose.cam_from_world.transpose() * span.arc.at(phi / span.arc.angle());
+        const Vector3d u = edge.to - edge.from, w = edge.from - view.pose.position_in_world;
+        const Vector3d n = u.cross(d);
+        return edge.from + d.cross(w).dot(n) / n.squaredNorm() * u;
+      };
+      for (size_t end = 0; end < 2; ++end) {
+        if (span.ends[end] != EndKind::kOccluder) continue;
+        const double phi = end == 0 ? span.phi0 : span.phi1, out = end == 0 ? -1 : 1;
+        const Vector3d outside = pointAt(phi + out * kStep), inside = pointAt(phi - out * kStep);
+        ++ends;
+        if (without.hidden(edge, outside)) continue;  // Not by something round.
+        ++round_ends;
+        wrong += !oracle.hidden(edge, inside) && oracle.hidden(edge, outside) ? 0 : 1;
+      }
+    }
+  }
+  std::printf("ends behind round things: %zu of %zu, wrong by 1e-7 rad: %zu; sides: %zu\n",
+              round_ends,
+              ends,
+              wrong,
+              sides);
+  EXPECT_GT(round_ends, 60U);
+  EXPECT_GT(sides, 20U);
+  EXPECT_LE(wrong, round_ends / 50);  // Where an outline meets the edge under a tiny angle.
 }
 
 // A rod all across the view, almost a half circle, behind a ball near one of its far ends: one of

@@ -11,6 +11,7 @@
 #include "synth/dataset/nearest_line.h"
 #include "synth/dataset/npy.h"
 #include "synth/parallel.h"
+#include "synth/tubes.h"
 
 namespace dlsd {
 namespace {
@@ -55,10 +56,21 @@ struct Bodies {
       const int r = root(static_cast<int>(f));
       of_face[f] = r == static_cast<int>(f) ? count++ : of_face[static_cast<size_t>(r)];
     }
+    for (size_t d = 0; d < scene.discs.size(); ++d) {
+      of_disc.push_back(count + static_cast<int>(scene.spheres.size() + d));
+    }
+    for (const Rod& rod : scene.rods) {
+      if (!rod.isRound()) continue;
+      const auto cap = static_cast<size_t>(rod.first_disc);
+      of_disc[cap + 1] = of_disc[cap];
+    }
+    first_tube = count + static_cast<int>(scene.spheres.size() + scene.discs.size());
   }
 
   std::vector<int> of_face;
-  int count = 0;
+  int count = 0;             ///< Of the faces; spheres follow, then discs and tubes.
+  std::vector<int> of_disc;  ///< A cylinder's caps have one number, which is its own.
+  int first_tube = 0;
 };
 
 /// What the rays through the pixels' centres meet.
@@ -139,8 +151,23 @@ class Centres {
         break;
       case HitKind::kDisc:
         normal = scene_.discs[index].normal.cast<double>().normalized();
-        seen.body = bodies_.count + static_cast<int>(scene_.spheres.size()) + hit.index;
+        seen.body = bodies_.of_disc[index];
         break;
+      case HitKind::kTube: {
+        const Tube& tube = scene_.tubes[index];
+        const Eigen::Vector3d point = origin + seen.depth * ray;
+        normal = (point - spineAt(tube, nearestOnSpine(tube, point))).normalized();
+        seen.body = bodies_.first_tube + hit.index;
+        break;
+      }
+      case HitKind::kRod: {
+        const Rod& rod = scene_.rods[index];
+        const Eigen::Vector3d axis = (rod.to - rod.from).normalized();
+        const Eigen::Vector3d m = origin + seen.depth * ray - rod.from;
+        normal = (m - axis * axis.dot(m)).normalized();
+        seen.body = bodies_.of_disc[static_cast<size_t>(rod.first_disc)];
+        break;
+      }
     }
     if (normal.dot(ray) > 0) normal = -normal;
     seen.normal_in_cam = pose_.cam_from_world * normal;

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <set>
 
 #include "synth/generate.h"
 #include "synth/labels.h"
@@ -123,6 +124,12 @@ TEST(Planes, InstancesAreBodies) {
   builder.addDecal(box.bottom, {DecalShape::kRectangle, {1, 0.5}, {0.3, 0.2}, 0, {0.9, 0}});
   builder.addSphere({-2, 2, 5}, 0.8, surface);
   builder.addDisc({2, 2, 5}, {0, 0, 1}, 0.8, surface);
+  builder.addRoundRod({-0.3, 0, 5}, {0.3, 0, 6}, 0.3, surface);
+  Tube ring;
+  ring.centre = {0, -2, 5};
+  ring.x = {0.5, 0, 0};
+  ring.y = {0, 0.5, 0};
+  builder.addTube(ring, surface);
   builder.finish();
   const std::array<double, 4> params{60, 60, 79.5, 79.5};
   const Camera camera = makeCamera("pinhole", params, 160, 160);
@@ -140,7 +147,13 @@ TEST(Planes, InstancesAreBodies) {
   EXPECT_EQ(at({-1.1, -1.1, 4.6}), 0);  // Another face of the first box.
   EXPECT_EQ(at({-2, 2, 5}), 2);
   EXPECT_EQ(at({2, 2, 5}), 3);
-  EXPECT_EQ(at({0, 0, 5}), -1);
+  const int cylinder = at({0, 0, 5.5});
+  EXPECT_EQ(at({-0.35, 0, 5}), cylinder);  // Its cap.
+  const int torus = at({0.5, -2, 5});
+  EXPECT_EQ(at({-0.5, -2, 5}), torus);
+  const std::set<int> numbers{0, 1, 2, 3, cylinder, torus};
+  EXPECT_EQ(numbers.size(), 6U);
+  EXPECT_EQ(at({0, -2, 5}), -1);
 }
 
 // Every pixel against all pieces of all labels.

@@ -4,6 +4,7 @@
 #include <Eigen/Geometry>
 #include <cmath>
 #include <utility>
+#include <vector>
 
 #include "synth/dataset/random.h"
 #include "synth/scene.h"
@@ -29,6 +30,26 @@ namespace dlsd {
                                               random->next(-0.4, 0.4),
                                               random->next(-0.4, 0.4)});
 }
+
+/// A solid bounded by planar polygons, as SceneBuilder::addSolid takes it.
+struct Shape {
+  std::vector<Eigen::Vector3d> vertices;
+  std::vector<std::vector<int>> loops;
+
+  /// Moves and scales it so that its bounding box fits the unit sphere.
+  void fitUnitSphere();
+  [[nodiscard]] double longestEdge() const;
+};
+
+/// A box, an L-shaped block, a prism or a pyramid that fits the unit sphere.
+[[nodiscard]] Shape drawShape(Random* random);
+
+/// Adds a shape that fits the unit sphere, turned and scaled, each face in a grey of its own.
+void addRandomSolid(Shape shape,
+                    const Eigen::Vector3d& centre,
+                    double radius,
+                    Random* random,
+                    SceneBuilder* builder);
 
 struct Bounds {
   double lo, hi;

@@ -13,10 +13,12 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <optional>
 #include <string>
 #include <utility>
 
 #include "cameras/calibration/files.h"
+#include "synth/tubes.h"
 
 namespace dlsd {
 namespace {
@@ -81,7 +83,81 @@ void intersect16(const int* valid, RTCScene scene, RTCRayHit16* rays) {
 }
 #endif
 
-constexpr unsigned kTriangles = 0, kSpheres = 1, kDiscs = 2;
+constexpr unsigned kTriangles = 0, kSpheres = 1, kDiscs = 2, kTubes = 3, kRods = 4;
+
+/// A piece of a tube, or a cylinder, in its box.
+struct RoundPart {
+  int index;  ///< Of the tube or rod.
+  Eigen::AlignedBox3d box;
+};
+
+/// What Embree hands back to us: the shapes that we intersect ourselves, in double.
+struct RoundParts {
+  const Scene* scene;
+  unsigned geometry;  ///< kTubes or kRods.
+  std::vector<RoundPart> parts;
+
+  /// Distance along the ray in (near, far) at which it enters the part, if it does.
+  [[nodiscard]] std::optional<double> enter(const RoundPart& part,
+                                            const Eigen::Vector3d& origin,
+                                            const Eigen::Vector3d& direction,
+                                            double near,
+                                            double far) const {
+    const auto index = static_cast<size_t>(part.index);
+    if (geometry == kRods) return enterCylinder(scene->rods[index], origin, direction, near, far);
+    for (int i = 0; i < 3; ++i) {
+      if (direction[i] == 0) continue;
+      const double a = (part.box.min()[i] - origin[i]) / direction[i];
+      const double b = (part.box.max()[i] - origin[i]) / direction[i];
+      near = std::max(near, std::min(a, b));
+      far = std::min(far, std::max(a, b));
+    }
+    return enterTube(scene->tubes[index], origin, direction, near, far);
+  }
+};
+
+void boundsOf(const RTCBoundsFunctionArguments* args) {
+  const auto& shapes = *static_cast<const RoundParts*>(args->geometryUserPtr);
+  const Eigen::AlignedBox3d& box = shapes.parts[args->primID].box;
+  const Eigen::Vector3f lo = box.min().cast<float>(), hi = box.max().cast<float>();
+  RTCBounds& bounds = *args->bounds_o;
+  bounds.lower_x = lo.x();
+  bounds.lower_y = lo.y();
+  bounds.lower_z = lo.z();
+  bounds.upper_x = hi.x();
+  bounds.upper_y = hi.y();
+  bounds.upper_z = hi.z();
+}
+
+void intersectRound(const RTCIntersectFunctionNArguments* args) {
+  const auto& shapes = *static_cast<const RoundParts*>(args->geometryUserPtr);
+  const RoundPart& part = shapes.parts[args->primID];
+  const unsigned n = args->N;
+  RTCRayN* rays = RTCRayHitN_RayN(args->rayhit, n);
+  RTCHitN* hits = RTCRayHitN_HitN(args->rayhit, n);
+  for (unsigned i = 0; i < n; ++i) {
+    if (args->valid[i] == 0) continue;
+    const Eigen::Vector3d origin =
+        Eigen::Vector3f(
+            RTCRayN_org_x(rays, n, i), RTCRayN_org_y(rays, n, i), RTCRayN_org_z(rays, n, i))
+            .cast<double>();
+    const Eigen::Vector3d direction =
+        Eigen::Vector3f(
+            RTCRayN_dir_x(rays, n, i), RTCRayN_dir_y(rays, n, i), RTCRayN_dir_z(rays, n, i))
+            .cast<double>();
+    float& far = RTCRayN_tfar(rays, n, i);
+    const auto distance = shapes.enter(part,
+                                       origin,
+                                       direction,
+                                       static_cast<double>(RTCRayN_tnear(rays, n, i)),
+                                       static_cast<double>(far));
+    if (!distance) continue;
+    far = static_cast<float>(*distance);
+    RTCHitN_geomID(hits, n, i) = shapes.geometry;
+    RTCHitN_primID(hits, n, i) = args->primID;
+    RTCHitN_instID(hits, n, i, 0) = RTC_INVALID_GEOMETRY_ID;
+  }
+}
 
 struct Mesh {
   std::vector<Eigen::Vector3f> vertices;
@@ -177,7 +253,7 @@ Mesh meshOf(const Scene& scene) {
 }  // namespace
 
 struct Raycaster::Impl {
-  explicit Impl(const Scene& scene) {
+  explicit Impl(const Scene& scene) : tubes{&scene, kTubes, {}}, rods{&scene, kRods, {}} {
     rtc_scene = rtcNewScene(device());
     if (rtc_scene == nullptr) throw SystemError("the ray caster is out of memory");
     rtcSetSceneFlags(rtc_scene, RTC_SCENE_FLAG_ROBUST);
@@ -185,6 +261,8 @@ struct Raycaster::Impl {
       if (!scene.triangles.empty()) addTriangles(scene);
       if (!scene.spheres.empty()) addSpheres(scene);
       if (!scene.discs.empty()) addDiscs(scene);
+      addRound(&tubes, tubeParts(scene));
+      addRound(&rods, rodParts(scene));
       // An arena of one thread: the tree, and so the winner among equal distances, does not depend
       // on the number of threads, and this thread does not pick up another frame while it waits.
       tbb::task_arena(1).execute([&] { rtcCommitScene(rtc_scene); });
@@ -258,6 +336,35 @@ struct Raycaster::Impl {
     attach(geometry, kDiscs);
   }
 
+  static std::vector<RoundPart> tubeParts(const Scene& scene) {
+    constexpr int kPieces = 12;
+    std::vector<RoundPart> parts;
+    for (size_t k = 0; k < scene.tubes.size(); ++k) {
+      for (const Eigen::AlignedBox3d& box : boxesOf(scene.tubes[k], kPieces)) {
+        parts.push_back({static_cast<int>(k), box});
+      }
+    }
+    return parts;
+  }
+  static std::vector<RoundPart> rodParts(const Scene& scene) {
+    std::vector<RoundPart> parts;
+    for (size_t k = 0; k < scene.rods.size(); ++k) {
+      if (scene.rods[k].isRound()) parts.push_back({static_cast<int>(k), boxOf(scene.rods[k])});
+    }
+    return parts;
+  }
+
+  void addRound(RoundParts* shapes, std::vector<RoundPart> parts) const {
+    shapes->parts = std::move(parts);
+    if (shapes->parts.empty()) return;
+    const RTCGeometry geometry = rtcNewGeometry(device(), RTC_GEOMETRY_TYPE_USER);
+    rtcSetGeometryUserPrimitiveCount(geometry, static_cast<unsigned>(shapes->parts.size()));
+    rtcSetGeometryUserData(geometry, shapes);
+    rtcSetGeometryBoundsFunction(geometry, boundsOf, nullptr);
+    rtcSetGeometryIntersectFunction(geometry, intersectRound);
+    attach(geometry, shapes->geometry);
+  }
+
   [[nodiscard]] Hit hitOf(unsigned geometry, unsigned primitive, float distance) const {
     switch (geometry) {
       case kTriangles:
@@ -266,6 +373,10 @@ struct Raycaster::Impl {
         return {HitKind::kSphere, static_cast<int>(primitive), distance};
       case kDiscs:
         return {HitKind::kDisc, static_cast<int>(primitive), distance};
+      case kTubes:
+        return {HitKind::kTube, tubes.parts[primitive].index, distance};
+      case kRods:
+        return {HitKind::kRod, rods.parts[primitive].index, distance};
       default:
         return {};
     }
@@ -273,6 +384,7 @@ struct Raycaster::Impl {
 
   RTCScene rtc_scene = nullptr;
   std::vector<int> triangle_faces;
+  RoundParts tubes, rods;
 };
 
 Raycaster::Raycaster(const Scene& scene) : impl_(std::make_unique<Impl>(scene)) {}

@@ -10,14 +10,29 @@
 
 namespace dlsd {
 
-enum class HitKind : uint8_t { kNothing, kFace, kSphere, kDisc };
+enum class HitKind : uint8_t { kNothing, kFace, kSphere, kDisc, kTube, kRod };
 
 /// What a ray meets first.
 struct Hit {
   HitKind kind = HitKind::kNothing;
-  int index = -1;      ///< Of the face, sphere or disc in the scene.
+  int index = -1;      ///< Of the face, sphere, disc, tube or (round) rod in the scene.
   float distance = 0;  ///< Along the ray, in lengths of its direction.
 };
+
+/// Whether a hit is on this rod: one of its faces, its side or its caps.
+[[nodiscard]] inline bool isOnRod(const Hit& hit, const Scene& scene, int rod_index) {
+  const Rod& rod = scene.rods[static_cast<size_t>(rod_index)];
+  switch (hit.kind) {
+    case HitKind::kFace:
+      return hit.index >= rod.first_face && hit.index < rod.first_face + rod.face_count;
+    case HitKind::kDisc:
+      return rod.isRound() && hit.index >= rod.first_disc && hit.index <= rod.first_disc + 1;
+    case HitKind::kRod:
+      return hit.index == rod_index;
+    default:
+      return false;
+  }
+}
 
 /// Rays with origins of their own, as a structure of arrays.
 struct RayPacket {

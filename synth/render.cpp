@@ -10,6 +10,7 @@
 #include "cameras/mutant.h"
 #include "synth/dataset/random.h"
 #include "synth/parallel.h"
+#include "synth/tubes.h"
 
 namespace dlsd {
 namespace {
@@ -22,20 +23,27 @@ constexpr float kStep = 2.0F / 255;
 /// Counts the curves that pass each pixel.
 class PixelMask {
  public:
+  static constexpr int kNoOwner = -1;
+
   PixelMask(int width, int height)
       : width_(width),
         height_(height),
-        curves_(static_cast<size_t>(width) * static_cast<size_t>(height), 0) {}
+        curves_(static_cast<size_t>(width) * static_cast<size_t>(height), 0),
+        owners_(curves_.size(), {kNoOwner, kNoOwner}) {}
 
-  /// A curve's points, joined by straight pieces. Pixels of which it only cuts a corner, less than
-  /// kMinLengthPx long, are left out: that corner is at most 0.4 % of the pixel.
-  void addCurve(const std::vector<Eigen::Vector2d>& points) {
+  /// A curve's points, joined by straight pieces, and its number if it is a span's. Pixels of which
+  /// it only cuts a corner, less than kMinLengthPx long, are left out: that corner is at most 0.4 %
+  /// of the pixel.
+  void addCurve(const std::vector<Eigen::Vector2d>& points, int owner = kNoOwner) {
+    current_ = owner;
     for (size_t i = 1; i < points.size(); ++i) addPiece(points[i - 1], points[i]);
     count();
   }
 
-  /// Curves through a pixel: 0, 1, or 2 for more.
+  /// Curves through a pixel: 0, 1, 2, or 3 for more.
   [[nodiscard]] int curves(size_t pixel) const { return curves_[pixel]; }
+  /// Numbers of the curves through a pixel, kNoOwner where there is none: of two at most.
+  [[nodiscard]] const std::array<int, 2>& owners(size_t pixel) const { return owners_[pixel]; }
   /// Whether no curve passes the pixels [x0, x1) x [y0, y1).
   [[nodiscard]] bool isFree(int x0, int x1, int y0, int y1) const {
     bool is_free = true;
@@ -89,9 +97,10 @@ class PixelMask {
     const bool inside =
         pixel_.x() >= 0 && pixel_.y() >= 0 && pixel_.x() < width_ && pixel_.y() < height_;
     if (inside && length_ >= kMinLengthPx) {
-      uint8_t& curves = curves_[static_cast<size_t>(pixel_.y()) * static_cast<size_t>(width_) +
-                                static_cast<size_t>(pixel_.x())];
-      curves = static_cast<uint8_t>(std::min(2, curves + 1));
+      const size_t pixel = static_cast<size_t>(pixel_.y()) * static_cast<size_t>(width_) +
+                           static_cast<size_t>(pixel_.x());
+      if (curves_[pixel] < 2) owners_[pixel][curves_[pixel]] = current_;
+      curves_[pixel] = static_cast<uint8_t>(std::min(3, curves_[pixel] + 1));
     }
     length_ = 0;
   }
@@ -100,38 +109,55 @@ class PixelMask {
 
   int width_, height_;
   std::vector<uint8_t> curves_;
+  std::vector<std::array<int, 2>> owners_;
+  int current_ = kNoOwner;
   Eigen::Vector2i pixel_{-1, -1};  ///< Where the curve is, and its length there so far.
   double length_ = 0;
 };
 
+/// The middle of a rod or of its shadow, where nothing is to be seen.
+bool isBarMiddle(const Scene& scene, const Edge& edge) {
+  const bool is_shadow = edge.source == EdgeSource::kShadow;
+  const Edge& line = is_shadow ? scene.edges[static_cast<size_t>(edge.caster)] : edge;
+  return line.source == EdgeSource::kRodCentre;
+}
+
 /// Adds the images of all circles and ellipses at which something may end, hidden or not.
 void addRoundOutlines(const Scene& scene, const Camera& camera, const Pose& pose, PixelMask* mask) {
   std::vector<Eigen::Vector2d> curve;
-  // An ellipse with these half axes, in the camera frame.
-  const auto add = [&](const Eigen::Vector3d& centre,
-                       const Eigen::Vector3d& a,
-                       const Eigen::Vector3d& b) {
-    // The angle it covers, in px at the image's centre: chords of less than 0.01 px.
-    const double radius = std::max(a.norm(), b.norm());
-    const double distance = std::max(centre.norm() - radius, 0.05 * radius);
-    const auto J = camera.jacobian(Eigen::Vector3d::UnitZ());
-    const double radius_px = (J ? J->norm() : camera.width()) * std::min(3.0, radius / distance);
-    const int pieces = std::clamp(static_cast<int>(25 * std::sqrt(radius_px)), 16, 2000);
-    curve.clear();
-    for (int k = 0; k <= pieces; ++k) {
-      const double phi = 2 * M_PI * k / pieces;
-      const auto pixel = camera.project(centre + std::cos(phi) * a + std::sin(phi) * b);
-      // At the seam of a panorama it jumps to the other side.
-      const bool goes_on =
-          pixel && (curve.empty() || (*pixel - curve.back()).norm() < camera.width() / 4.0);
-      if (!goes_on) {
-        mask->addCurve(curve);
-        curve.clear();
-      }
-      if (pixel) curve.push_back(*pixel);
+  const auto goOn = [&](const Eigen::Vector3d& point_in_cam) {
+    const auto pixel = camera.project(point_in_cam);
+    // At the seam of a panorama it jumps to the other side.
+    const bool goes_on =
+        pixel && (curve.empty() || (*pixel - curve.back()).norm() < camera.width() / 4.0);
+    if (!goes_on) {
+      mask->addCurve(curve);
+      curve.clear();
     }
-    mask->addCurve(curve);
+    if (pixel) curve.push_back(*pixel);
   };
+  const auto end = [&] {
+    mask->addCurve(curve);
+    curve.clear();
+  };
+  // Pieces whose chords are within a hundredth of a pixel, for a curve of this size (m).
+  const auto piecesFor = [&](double size, double nearest_centre) {
+    // The angle it covers, in px at the image's centre.
+    const double distance = std::max(nearest_centre - size, 0.05 * size);
+    const auto J = camera.jacobian(Eigen::Vector3d::UnitZ());
+    const double size_px = (J ? J->norm() : camera.width()) * std::min(3.0, size / distance);
+    return std::clamp(static_cast<int>(25 * std::sqrt(size_px)), 16, 2000);
+  };
+  // An ellipse with these half axes, in the camera frame.
+  const auto add =
+      [&](const Eigen::Vector3d& centre, const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
+        const int pieces = piecesFor(std::max(a.norm(), b.norm()), centre.norm());
+        for (int k = 0; k <= pieces; ++k) {
+          const double phi = 2 * M_PI * k / pieces;
+          goOn(centre + std::cos(phi) * a + std::sin(phi) * b);
+        }
+        end();
+      };
   for (const Sphere& sphere : scene.spheres) {
     // The circle in which the cone from the camera touches the sphere.
     const Eigen::Vector3d centre = pose.toCam(sphere.centre.cast<double>());
@@ -146,6 +172,14 @@ void addRoundOutlines(const Scene& scene, const Camera& camera, const Pose& pose
     const Eigen::Vector3d normal = pose.cam_from_world * disc.normal.cast<double>();
     const Eigen::Vector3d a = normal.unitOrthogonal() * static_cast<double>(disc.radius);
     add(pose.toCam(disc.centre.cast<double>()), a, normal.cross(a));
+  }
+  for (const Tube& tube : scene.tubes) {
+    const double size = tube.x.norm() + tube.y.norm() + tube.radius;
+    const int pieces = piecesFor(size, pose.toCam(tube.centre).norm());
+    for (const auto& outline : outlineOf(tube, pose.position_in_world, pieces)) {
+      for (const Eigen::Vector3d& point : outline) goOn(pose.toCam(point));
+      end();
+    }
   }
   for (const Face& face : scene.faces) {
     if (face.normal.dot(pose.position_in_world - face.origin) <= 0) continue;
@@ -194,7 +228,13 @@ class RayBatch {
     count_ = kFineSamples;
   }
 
-  /// Casts the rays [from, to), from a multiple of a packet, and looks what they see.
+  void swap(size_t i, size_t k) {
+    std::swap(x_[i], x_[k]);
+    std::swap(y_[i], y_[k]);
+    std::swap(z_[i], z_[k]);
+  }
+
+  /// Casts the rays [from, to) and looks what they see.
   void cast(size_t from, size_t to) {
     for (size_t k = from; k < to; k += Raycaster::kPacket) {
       const size_t count = std::min(Raycaster::kPacket, to - k);
@@ -217,7 +257,12 @@ class RayBatch {
   [[nodiscard]] float radiance(size_t i, const Eigen::Vector3f& direction) const {
     return shader_.radiance(hits_[i], origin_, direction.cast<double>(), sights_[i]);
   }
-  [[nodiscard]] bool isFlat(size_t i) const { return hits_[i].kind != HitKind::kSphere; }
+  /// Whether the mean of the radiance over rays that see what ray i sees is that of their mean.
+  [[nodiscard]] bool isFlat(size_t i) const {
+    return (hits_[i].kind == HitKind::kFace || hits_[i].kind == HitKind::kDisc) &&
+           !shader_.isTextured(sights_[i]);
+  }
+  [[nodiscard]] bool isTextured(size_t i) const { return shader_.isTextured(sights_[i]); }
   [[nodiscard]] Eigen::Vector3f ray(size_t i) const { return {x_[i], y_[i], z_[i]}; }
 
  private:
@@ -264,6 +309,7 @@ class FirstLook {
   struct Corner {
     Sight sight = kNoRay;
     float radiance = 0;
+    bool is_textured = false;
   };
 
   /// Corners of the blocks of the band, in packets of neighbours.
@@ -287,7 +333,7 @@ class FirstLook {
         }
         batch_.cast();
         for (size_t k = 0; k < batch_.count(); ++k) {
-          corners_[slots[k]] = {batch_.sight(k), batch_.radiance(k)};
+          corners_[slots[k]] = {batch_.sight(k), batch_.radiance(k), batch_.isTextured(k)};
         }
       }
     }
@@ -303,7 +349,7 @@ class FirstLook {
         std::minmax({above[0].radiance, above[1].radiance, below[0].radiance, below[1].radiance});
     const Sight sight = above[0].sight;
     if (above[1].sight != sight || below[0].sight != sight || below[1].sight != sight ||
-        brightest - darkest > kStep || !mask_.isFree(x0, x1, y0, y1)) {
+        above[0].is_textured || brightest - darkest > kStep || !mask_.isFree(x0, x1, y0, y1)) {
       return false;
     }
     for (int y = y0; y < y1; ++y) {
@@ -399,16 +445,25 @@ class FineSampler {
       : rays_(rays), batch_(batch), shade_all_(shade_all) {}
 
   /// @param may_stop  One packet is enough if it shows surfaces without a step between them.
-  void look(int i, int j, uint64_t shift_bits, bool may_stop, FinePixel* pixel) {
+  /// @param borders   If nothing but one or two straight edges passes the pixel, the normals (world
+  ///                  frame) of the planes through them and the camera; else nullptr.
+  void look(int i,
+            int j,
+            uint64_t shift_bits,
+            bool may_stop,
+            const std::array<const Eigen::Vector3f*, 2>& borders,
+            FinePixel* pixel) {
     prepare(i, j, shift_bits);
     size_t samples = kFineSamples;
-    if (may_stop && batch_.count() == kFineSamples) {
+    if ((may_stop || borders[0] != nullptr) && batch_.count() == kFineSamples) {
       gather(0, Raycaster::kPacket);
       shade();
-      if (share_count_ > 1 && spread() <= kStep) {
+      if (may_stop && share_count_ > 1 && spread() <= kStep) {
         samples = Raycaster::kPacket;
       } else {
-        gather(Raycaster::kPacket, kFineSamples);
+        if (borders[0] == nullptr || !gatherBySide(borders)) {
+          gather(Raycaster::kPacket, kFineSamples);
+        }
         shade();
       }
     } else {
@@ -518,6 +573,43 @@ class FineSampler {
         share.radiance_sum += values_[slots_[k]];
       }
     }
+  }
+
+  /// After the first packet: if each side of the borders shows one flat surface alone, the other
+  /// samples see what their side shows; those of a side without a sample so far are cast. False,
+  /// with nothing done, where sides show more.
+  bool gatherBySide(const std::array<const Eigen::Vector3f*, 2>& borders) {
+    constexpr size_t kNoShare = kFineSamples;
+    std::array<size_t, 4> shown{kNoShare, kNoShare, kNoShare, kNoShare};
+    std::array<uint8_t, kFineSamples> side;
+    const Eigen::Vector3f first = *borders[0];
+    const Eigen::Vector3f second = borders[1] != nullptr ? *borders[1] : first;
+    for (size_t k = 0; k < kFineSamples; ++k) {
+      const Eigen::Vector3f ray = batch_.ray(k);
+      side[k] = static_cast<uint8_t>((first.dot(ray) > 0 ? 1 : 0) + (second.dot(ray) > 0 ? 2 : 0));
+    }
+    for (size_t k = 0; k < Raycaster::kPacket; ++k) {
+      const size_t share = share_of_[slots_[k]];
+      size_t& known = shown[side[k]];
+      if (!shares_[share].one_for_all || (known != kNoShare && known != share)) return false;
+      known = share;
+    }
+    size_t next = Raycaster::kPacket;
+    for (size_t k = next; k < kFineSamples; ++k) {
+      if (shown[side[k]] != kNoShare) continue;
+      batch_.swap(k, next);
+      std::swap(side[k], side[next]);
+      std::swap(slots_[k], slots_[next]);
+      ++next;
+    }
+    gather(Raycaster::kPacket, next);
+    for (size_t k = next; k < kFineSamples; ++k) {
+      const size_t share = shown[side[k]];
+      share_of_[slots_[k]] = static_cast<uint8_t>(share);
+      ++shares_[share].samples;
+      shares_[share].ray_sum += batch_.ray(k);
+    }
+    return true;
   }
 
   /// Radiance of the surfaces. Over a pixel it changes linearly on a flat one, so that in the
@@ -728,8 +820,14 @@ Rendering renderRadiance(const Scene& scene,
   PixelMask mask(width, height);
   Pixels pixels{std::vector<Sight>(w * static_cast<size_t>(height), kUnknown),
                 std::vector<float>(w * static_cast<size_t>(height), 0.0F)};
+  std::vector<Eigen::Vector3f> borders;  // Of the spans.
   if (adaptive) {
-    for (const EdgeSpan& span : spans) mask.addCurve(span.curve);
+    for (size_t k = 0; k < spans.size(); ++k) {
+      // Middles of rods and of their shadows are no borders.
+      const Edge& edge = scene.edges[static_cast<size_t>(spans[k].edge)];
+      if (!isBarMiddle(scene, edge)) mask.addCurve(spans[k].curve, static_cast<int>(k));
+      borders.push_back((pose.cam_from_world.transpose() * spans[k].arc.normal).cast<float>());
+    }
     addRoundOutlines(scene, rays.camera(), pose, &mask);
     forEachBand(height, [&](int /*band*/, int first, int end) {
       FirstLook(rays, mask, prototype, !shader.hasShadows()).look(first, end, &pixels);
@@ -754,7 +852,15 @@ Rendering renderRadiance(const Scene& scene,
         }
         // Anything thin has two borders.
         const bool may_stop = adaptive && mask.curves(pixel) < 2;
-        sampler.look(i, j, hashCounters({key, pixel}), may_stop, &fine);
+        std::array<const Eigen::Vector3f*, 2> own{nullptr, nullptr};
+        if (adaptive && mask.curves(pixel) <= 2) {
+          const auto& [one, other] = mask.owners(pixel);
+          const bool known = one != PixelMask::kNoOwner &&
+                             (mask.curves(pixel) == 1 || other != PixelMask::kNoOwner);
+          if (known) own[0] = &borders[static_cast<size_t>(one)];
+          if (known && mask.curves(pixel) == 2) own[1] = &borders[static_cast<size_t>(other)];
+        }
+        sampler.look(i, j, hashCounters({key, pixel}), may_stop, own, &fine);
         constants[pixel] = fine.constant;
         splats.add(i, j, fine);
         ++fine_pixels[b];

@@ -90,7 +90,9 @@ struct Rendering {
 /// outlines of spheres, discs and elliptic decals. These pixels, the rim of the camera's domain,
 /// and pixels that differ from a neighbour (where round things enter others) get kFineSamples
 /// samples in a rank-1 lattice, mirrored and shifted by a hash of (key, pixel); a fourth of them if
-/// at most one curve passes and the step between the surfaces is at most 2 grey levels. So neither
+/// at most one curve passes and the step between the surfaces is at most 2 grey levels. Where
+/// nothing but one or two straight edges passes and a fourth of the samples show one surface on
+/// each of their sides, the others are told apart by the edges' planes in place of rays. So neither
 /// edges nor rods of any thinness are missed. Flat surfaces are shaded once a pixel, in the middle
 /// of their samples. Samples reach neighbouring pixels with the response's weight at their very
 /// positions.

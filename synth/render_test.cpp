@@ -13,6 +13,8 @@
 #include "synth/dataset/random.h"
 #include "synth/generate.h"
 #include "synth/test_cameras.h"
+#include "synth/tubes.h"
+#include "synth/variety.h"
 
 namespace dlsd {
 namespace {
@@ -53,33 +55,40 @@ TEST(CameraRays, InterpolateWithinTheirBound) {
 
 // Where the adaptive image spends fewer than 64 samples, they would not have changed it.
 TEST(Render, AdaptiveEqualsSixtyFourSamplesEverywhere) {
-  for (const auto& [name, camera] : testCameras(3)) {
-    size_t pixels = 0, off = 0;
-    const CameraRays rays(camera);
-    const SceneView view = makeSceneView("room", 200, 1);
-    const Raycaster raycaster(view.scene);
-    const Shader shader(view.scene);
-    const PixelResponse response(0.7, 0);
-    const auto spans = visibleSpans(view.scene, raycaster, camera, view.pose);
-    const auto render = [&](Sampling sampling) {
-      return renderRadiance(
-          view.scene, raycaster, shader, rays, view.pose, spans, 5, response, sampling);
-    };
-    const Rendering adaptive = render(Sampling::kAdaptive), full = render(Sampling::kEverywhere);
-    EXPECT_LT(adaptive.fine_pixels, full.fine_pixels / 2) << name;
-    for (size_t i = 0; i < full.radiance.size(); ++i) {
-      ++pixels;
-      const double difference = std::abs(static_cast<double>(full.radiance[i]) -
-                                         static_cast<double>(adaptive.radiance[i]));
-      off += difference * 255 > 1 ? 1U : 0U;
+  // A room, and solids among tubes, cylinders and patterns.
+  SceneView solids = makeSceneView("polyhedra", 200, 1);
+  SceneVariety variety;
+  variety.distractors = variety.clutter = {15, 15};
+  variety.noise = variety.wood = {0.15, 0.15};
+  addVariety(variety, 200, 1, &solids);
+  addRodSides(solids.pose.position_in_world, &solids.scene);
+  for (const SceneView& view : {makeSceneView("room", 200, 1), solids})
+    for (const auto& [name, camera] : testCameras(3)) {
+      size_t pixels = 0, off = 0;
+      const CameraRays rays(camera);
+      const Raycaster raycaster(view.scene);
+      const Shader shader(view.scene);
+      const PixelResponse response(0.7, 0);
+      const auto spans = visibleSpans(view.scene, raycaster, camera, view.pose);
+      const auto render = [&](Sampling sampling) {
+        return renderRadiance(
+            view.scene, raycaster, shader, rays, view.pose, spans, 5, response, sampling);
+      };
+      const Rendering adaptive = render(Sampling::kAdaptive), full = render(Sampling::kEverywhere);
+      EXPECT_LT(adaptive.fine_pixels, full.fine_pixels / 2) << name;
+      for (size_t i = 0; i < full.radiance.size(); ++i) {
+        ++pixels;
+        const double difference = std::abs(static_cast<double>(full.radiance[i]) -
+                                           static_cast<double>(adaptive.radiance[i]));
+        off += difference * 255 > 1 ? 1U : 0U;
+      }
+      std::printf("%s: adaptive sampling: %zu of %zu pixels differ by more than 1 grey level\n",
+                  name.c_str(),
+                  off,
+                  pixels);
+      EXPECT_GT(pixels, 140000U) << name;
+      EXPECT_LE(off, pixels / 10000) << name;
     }
-    std::printf("%s: adaptive sampling: %zu of %zu pixels differ by more than 1 grey level\n",
-                name.c_str(),
-                off,
-                pixels);
-    EXPECT_GT(pixels, 140000U) << name;
-    EXPECT_LE(off, pixels / 10000) << name;
-  }
 }
 
 /// What a pixel answers, by its definition: the mean radiance of single rays at random places

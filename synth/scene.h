@@ -1,8 +1,8 @@
 #pragma once
-// A scene: planar faces with printed decals, rods, spheres, discs, lights, and the straight edges
-// that belong to labels. World frame: metres, z up. Vertices are rounded to float when they are
-// added, and labels are computed in double from these very vertices, which are also what the ray
-// caster gets.
+// A scene: planar faces with printed decals, rods, spheres, discs, tubes, lights, and the straight
+// edges that belong to labels. World frame: metres, z up. Vertices are rounded to float when they
+// are added, and labels are computed in double from these very vertices, which are also what the
+// ray caster gets.
 
 #include <Eigen/Core>
 #include <array>
@@ -13,11 +13,24 @@
 
 namespace dlsd {
 
-/// What a face, decal, sphere or disc looks like. Each has a surface of its own, so that the
-/// surface index tells pixels apart.
+/// What a face, decal, sphere, disc, tube or round rod looks like. Each has a surface of its own,
+/// so that the surface index tells pixels apart.
 struct Surface {
   double albedo = 0.5;  ///< Of the diffuse reflection, in [0, 1].
   double emission = 0;  ///< Radiance added to it.
+  int texture = -1;     ///< In Scene::textures; -1: plain.
+};
+
+/// A smooth pattern in space that changes the albedo: without steps, so without edges.
+struct Texture {
+  enum class Kind {
+    kNoise,  ///< Blotches of three sizes: value noise, each octave half as large and strong.
+    kWood,   ///< Rings around an axis (its z), uneven and drawn out along it.
+  } kind = Kind::kNoise;
+  Eigen::Matrix3d axes = Eigen::Matrix3d::Identity();  ///< Rows: unit axes.
+  double size_m = 0.1;     ///< Of the largest blotches; distance of rings. > 0.
+  double amplitude = 0.3;  ///< The albedo is multiplied by 1 - amplitude to 1 + amplitude.
+  uint64_t seed = 0;
 };
 
 enum class DecalShape { kRectangle, kEllipse };
@@ -69,29 +82,52 @@ struct Disc {
   int surface;
 };
 
-/// A prism with square or octagonal section. Its long edges and caps are ordinary edges and faces;
-/// labels.h says when a view is labelled by the centre line in their place.
+/// All balls of one radius whose centres lie on a smooth curve, its spine. Nothing of it is
+/// straight.
+struct Tube {
+  enum class Kind {
+    kRing,  ///< A torus: centre + cos(t) x + sin(t) y, t in [-pi, pi]; x, y square, of one length.
+    kString,  ///< A sagging wire, a parabola: centre + t x + t^2 y, t in [-1, 1]. Its ends are
+              ///< round.
+  } kind = Kind::kRing;
+  Eigen::Vector3d centre{0, 0, 0}, x{1, 0, 0}, y{0, 1, 0};
+  double radius = 0.1;  ///< Less than the spine's least radius of curvature.
+  int surface = -1;
+};
+
+/// A prism with square or octagonal section, or a cylinder. A prism's long edges and caps are
+/// ordinary edges and faces; a cylinder's caps are discs, and its sides as seen from somewhere
+/// become edges by addRodSides. labels.h says when a view is labelled by the centre line in their
+/// place.
 struct Rod {
   Eigen::Vector3d from, to;  ///< Centre line.
   double radius;             ///< Of the section's corners.
   int first_face, face_count;
+  int surface = -1;     ///< Of a cylinder's side; -1: a prism.
+  int first_disc = -1;  ///< Of a cylinder's two caps.
+
+  [[nodiscard]] bool isRound() const { return surface >= 0; }
 };
 
 enum class EdgeSource {
   kFaces,      ///< Where two faces meet.
   kDecal,      ///< Straight border of a decal.
   kRodCentre,  ///< Centre line of a rod.
-  kShadow,     ///< Border of a shadow on a face (shadows.h); of rods also its middle.
+  kShadow,     ///< Border of a shadow on a face or disc (shadows.h); of rods also its middle.
+  kRodSide,    ///< Side of a cylinder as seen from the camera, or from a light (light >= 0).
 };
 
 /// A straight edge that labels may show.
 struct Edge {
   Eigen::Vector3d from, to;
   EdgeSource source = EdgeSource::kFaces;
-  int face0 = -1, face1 = -1;   ///< kFaces: both; kDecal, kShadow: face0; kRodCentre: none.
-  int rod = -1;                 ///< The rod that it belongs to (kShadow: that casts it), or -1.
-  int carrier = 0;              ///< Edges on one infinite line share it.
-  int caster = -1, light = -1;  ///< kShadow: the edge and the light whose shadow it is.
+  /// kFaces: both; kDecal, kShadow on a face: face0; else none.
+  int face0 = -1, face1 = -1;
+  int rod = -1;     ///< The rod that it belongs to (kShadow: that casts it), or -1.
+  int carrier = 0;  ///< Edges on one infinite line share it.
+  int caster = -1;  ///< kShadow: the edge whose shadow it is.
+  int light = -1;   ///< kShadow: the light. kRodSide: see there.
+  int disc = -1;    ///< kShadow: the disc that it lies on, if not on face0.
 };
 
 /// A light for Lambert surfaces.
@@ -101,7 +137,7 @@ struct Light {
   double strength = 0;             ///< Irradiance / pi at normal incidence; kPoint: at no distance.
   double half_distance = 1;        ///< kPoint: strength / (1 + (d / half_distance)^2).
   /// Whether faces that look at the light (not their backs: a sun shines into a room from outside),
-  /// spheres and discs keep it from what is behind them. At most 7 lights of a scene.
+  /// and round things keep it from what is behind them. At most 7 lights of a scene.
   bool casts_shadows = false;
 };
 
@@ -118,8 +154,10 @@ struct Scene {
   std::vector<Triangle> triangles;
   std::vector<Face> faces;
   std::vector<Surface> surfaces;
+  std::vector<Texture> textures;
   std::vector<Sphere> spheres;
   std::vector<Disc> discs;
+  std::vector<Tube> tubes;
   std::vector<Rod> rods;
   std::vector<Edge> edges;
   std::vector<Light> lights;

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <utility>
 
 namespace dlsd {
 namespace {
@@ -44,6 +45,10 @@ bool inPocket(double x, double y, const std::vector<Pocket>& pockets) {
 }
 
 }  // namespace
+
+SceneBuilder::SceneBuilder(Scene base) : scene(std::move(base)) {
+  for (const SolidPiece& piece : scene.pieces) solid_ = std::max(solid_, piece.solid + 1);
+}
 
 int SceneBuilder::addVertex(const Eigen::Vector3d& p) {
   scene.vertices.emplace_back(p.cast<float>());
@@ -302,6 +307,36 @@ void SceneBuilder::addRod(const Eigen::Vector3d& from,
   scene.pieces.push_back({(from + to) / 2, axes, {half, half, (to - from).norm() / 2}, solid_++});
 }
 
+void SceneBuilder::addRoundRod(const Eigen::Vector3d& from,
+                               const Eigen::Vector3d& to,
+                               double radius,
+                               const Surface& surface) {
+  Rod rod;
+  rod.from = roundToFloat(from);
+  rod.to = roundToFloat(to);
+  rod.radius = static_cast<double>(static_cast<float>(radius));
+  rod.first_face = static_cast<int>(scene.faces.size());
+  rod.face_count = 0;
+  rod.surface = addSurface(surface);
+  rod.first_disc = static_cast<int>(scene.discs.size());
+  const Eigen::Vector3d axis = (rod.to - rod.from).normalized();
+  addDisc(rod.from, -axis, rod.radius, surface);
+  addDisc(rod.to, axis, rod.radius, surface);
+  Edge centre;
+  centre.from = rod.from;
+  centre.to = rod.to;
+  centre.source = EdgeSource::kRodCentre;
+  centre.rod = static_cast<int>(scene.rods.size());
+  scene.edges.push_back(centre);
+  const double half = (rod.to - rod.from).norm() / 2;
+  Eigen::Matrix3d axes;
+  axes.col(0) = axis.unitOrthogonal();
+  axes.col(1) = axis.cross(axes.col(0));
+  axes.col(2) = axis;
+  scene.pieces.push_back({(rod.from + rod.to) / 2, axes, {rod.radius, rod.radius, half}, solid_++});
+  scene.rods.push_back(rod);
+}
+
 void SceneBuilder::addJointedRods(const std::vector<Eigen::Vector3d>& nodes,
                                   const std::vector<std::array<size_t, 2>>& links,
                                   double radius,
@@ -351,6 +386,11 @@ void SceneBuilder::addDisc(const Eigen::Vector3d& centre,
                          normal.normalized().cast<float>(),
                          static_cast<float>(radius),
                          addSurface(surface)});
+}
+
+void SceneBuilder::addTube(Tube tube, const Surface& surface) {
+  tube.surface = addSurface(surface);
+  scene.tubes.push_back(tube);
 }
 
 void SceneBuilder::addDecal(int face, const Print& print) {

@@ -58,6 +58,10 @@ void numberCarriers(std::vector<Edge>* edges);
 
 class SceneBuilder {
  public:
+  SceneBuilder() = default;
+  /// Adds to a scene that is there already.
+  explicit SceneBuilder(Scene base);
+
   /// Front of a panel at z = `z` of the frame (x right, y up, z to the viewer), [0, width] x
   /// [0, height], with everything in its pockets. The border's edges are the caller's.
   PanelFaces addPanel(
@@ -105,11 +109,20 @@ class SceneBuilder {
                       const std::vector<std::array<size_t, 2>>& links,
                       double radius,
                       const Surface& surface);
+  /// A cylinder: a rod with a round section, closed by discs. Its sides become edges by
+  /// addRodSides.
+  void addRoundRod(const Eigen::Vector3d& from,
+                   const Eigen::Vector3d& to,
+                   double radius,
+                   const Surface& surface);
   void addSphere(const Eigen::Vector3d& centre, double radius, const Surface& surface);
   void addDisc(const Eigen::Vector3d& centre,
                const Eigen::Vector3d& normal,
                double radius,
                const Surface& surface);
+
+  /// Of the tube everything but the surface.
+  void addTube(Tube tube, const Surface& surface);
 
   /// Rectangles bring four edges, ellipses none.
   void addDecal(int face, const Print& print);

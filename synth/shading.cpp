@@ -8,6 +8,8 @@
 #include <string>
 
 #include "cameras/mutant.h"
+#include "synth/dataset/random.h"
+#include "synth/tubes.h"
 
 namespace dlsd {
 
@@ -32,7 +34,46 @@ double lightIrradiance(const Light& light,
           d2 / (light.half_distance * (DLSD_MUTANT("lamp-distance") ? 2 : light.half_distance)));
 }
 
+/// Value noise in [-1, 1]: random values at the points with whole coordinates, between them the
+/// quintic that has no first and second derivative at its ends.
+double valueNoise(const Eigen::Vector3d& p, uint64_t seed) {
+  std::array<int64_t, 3> cell;
+  std::array<double, 3> w;
+  for (int i = 0; i < 3; ++i) {
+    const double floor = std::floor(p[i]), t = p[i] - floor;
+    cell[static_cast<size_t>(i)] = static_cast<int64_t>(floor);
+    w[static_cast<size_t>(i)] = t * t * t * (t * (6 * t - 15) + 10);
+  }
+  double sum = 0;
+  for (int corner = 0; corner < 8; ++corner) {
+    const int i = corner & 1, j = corner >> 1 & 1, k = corner >> 2;
+    const double weight =
+        (i != 0 ? w[0] : 1 - w[0]) * (j != 0 ? w[1] : 1 - w[1]) * (k != 0 ? w[2] : 1 - w[2]);
+    const uint64_t bits = hashCounters({seed,
+                                        static_cast<uint64_t>(cell[0] + i),
+                                        static_cast<uint64_t>(cell[1] + j),
+                                        static_cast<uint64_t>(cell[2] + k)});
+    sum += weight * (2 * unitFromBits(bits) - 1);
+  }
+  return sum;
+}
+
 }  // namespace
+
+double textureFactor(const Texture& texture, const Eigen::Vector3d& point) {
+  const Eigen::Vector3d p = texture.axes * point / texture.size_m;
+  if (texture.kind == Texture::Kind::kNoise) {
+    const double sum = 4 * valueNoise(p, texture.seed) + 2 * valueNoise(2 * p, texture.seed + 1) +
+                       valueNoise(4 * p, texture.seed + 2);
+    return 1 + texture.amplitude * sum / 7;
+  }
+  constexpr double kAlong = 0.05, kUneven = 0.8;
+  const Eigen::Vector3d q(p.x(), p.y(), kAlong * p.z());
+  // Rounded off at the axis, where the distance from it has a kink.
+  const double radius = std::sqrt(p.x() * p.x() + p.y() * p.y() + 0.01);
+  const double ring = radius + kUneven * valueNoise(q, texture.seed);
+  return 1 + texture.amplitude * std::sin(2 * M_PI * ring);
+}
 
 double irradiance(const Scene& scene, const Eigen::Vector3d& point, const Eigen::Vector3d& normal) {
   double sum = ambientIrradiance(scene, normal);
@@ -41,7 +82,10 @@ double irradiance(const Scene& scene, const Eigen::Vector3d& point, const Eigen:
 }
 
 Shader::Shader(const Scene& scene, const Raycaster* raycaster)
-    : scene_(&scene), raycaster_(raycaster), grids_(scene.faces.size()) {
+    : scene_(&scene),
+      has_textures_(!scene.textures.empty()),
+      raycaster_(raycaster),
+      grids_(scene.faces.size()) {
   for (const Light& light : scene.lights) {
     if (light.casts_shadows && raycaster != nullptr) {
       shadow_lights_.push_back(light);
@@ -133,8 +177,16 @@ Eigen::Vector3d Shader::pointOnFace(const Hit& hit,
 
 int Shader::surfaceOfRound(const Hit& hit) const {
   const auto index = static_cast<size_t>(hit.index);
-  return hit.kind == HitKind::kSphere ? scene_->spheres[index].surface
-                                      : scene_->discs[index].surface;
+  switch (hit.kind) {
+    case HitKind::kSphere:
+      return scene_->spheres[index].surface;
+    case HitKind::kDisc:
+      return scene_->discs[index].surface;
+    case HitKind::kTube:
+      return scene_->tubes[index].surface;
+    default:
+      return scene_->rods[index].surface;
+  }
 }
 
 Shader::Place Shader::placeOf(const Hit& hit,
@@ -147,6 +199,15 @@ Shader::Place Shader::placeOf(const Hit& hit,
   const Eigen::Vector3d point = origin + static_cast<double>(hit.distance) * direction;
   if (hit.kind == HitKind::kSphere) {
     return {point, (point - scene_->spheres[index].centre.cast<double>()).normalized()};
+  }
+  if (hit.kind == HitKind::kTube) {
+    const Tube& tube = scene_->tubes[index];
+    return {point, (point - spineAt(tube, nearestOnSpine(tube, point))).normalized()};
+  }
+  if (hit.kind == HitKind::kRod) {
+    const Rod& rod = scene_->rods[index];
+    const Eigen::Vector3d axis = (rod.to - rod.from).normalized(), m = point - rod.from;
+    return {point, (m - axis * axis.dot(m)).normalized()};
   }
   const Eigen::Vector3d normal = scene_->discs[index].normal.cast<double>();
   const Eigen::Vector3d centre = scene_->discs[index].centre.cast<double>();
@@ -243,11 +304,15 @@ float Shader::radiance(const Hit& hit,
                        const Eigen::Vector3d& direction,
                        Sight sight) const {
   if (sight < 0) return 0;
-  const Surface& s = scene_->surfaces[static_cast<size_t>(sight & ((1 << kSurfaceBits) - 1))];
+  const Surface& s = surfaceOf(sight);
+  double albedo = s.albedo;
   const bool is_face = hit.kind == HitKind::kFace;
   double sum = is_face ? faces_[static_cast<size_t>(hit.index)].irradiance : 0;
-  if (!is_face || !point_lights_.empty() || !shadow_lights_.empty()) {
+  if (!is_face || !point_lights_.empty() || !shadow_lights_.empty() || s.texture >= 0) {
     const Place place = placeOf(hit, origin, direction);
+    if (s.texture >= 0) {
+      albedo *= textureFactor(scene_->textures[static_cast<size_t>(s.texture)], place.point);
+    }
     if (!is_face) {
       sum = ambientIrradiance(*scene_, place.normal);
       for (const Light& sun : plain_suns_) sum += lightIrradiance(sun, place.point, place.normal);
@@ -260,7 +325,7 @@ float Shader::radiance(const Hit& hit,
       sum += lightIrradiance(shadow_lights_[k], place.point, place.normal);
     }
   }
-  return static_cast<float>(s.albedo * sum + s.emission);
+  return static_cast<float>(albedo * sum + s.emission);
 }
 
 Seen Shader::shade(const Hit& hit,

@@ -10,6 +10,10 @@
 
 namespace dlsd {
 
+/// What a texture multiplies the albedo by at a point (world): 1 - amplitude to 1 + amplitude,
+/// twice differentiable.
+[[nodiscard]] double textureFactor(const Texture& texture, const Eigen::Vector3d& point);
+
 /// What is seen at a point, as a number that tells pixels apart: the index of the surface in
 /// Scene::surfaces in the low kSurfaceBits bits; above them one bit for each light that casts
 /// shadows, set where it is hidden. -1: nothing (black).
@@ -36,6 +40,10 @@ class Shader {
   explicit Shader(const Scene& scene, const Raycaster* raycaster = nullptr);
 
   [[nodiscard]] bool hasShadows() const { return !shadow_lights_.empty(); }
+  /// Whether the radiance of a sight has a pattern.
+  [[nodiscard]] bool isTextured(Sight sight) const {
+    return has_textures_ && sight >= 0 && surfaceOf(sight).texture >= 0;
+  }
 
   /// What the ray from `origin` (world) along `direction` sees at its hit, without regard to
   /// shadows. On faces the point is computed in double from the face's plane, so decal borders are
@@ -69,6 +77,10 @@ class Shader {
                            const Eigen::Vector3d& direction) const;
 
  private:
+  [[nodiscard]] const Surface& surfaceOf(Sight sight) const {
+    return scene_->surfaces[static_cast<size_t>(sight & ((1 << kSurfaceBits) - 1))];
+  }
+
   /// Decals of a face by cells of its plane; a cell lists what touches it, in face order.
   struct DecalGrid {
     Eigen::Vector2d lo{0, 0}, cells_per_metre{0, 0};
@@ -103,6 +115,7 @@ class Shader {
   };
 
   const Scene* scene_;
+  bool has_textures_;
   std::vector<FaceLook> faces_;
   std::vector<Light> plain_suns_;
   std::vector<Light> point_lights_;   ///< Those without shadows: their light depends on the place.

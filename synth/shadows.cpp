@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "synth/scene_builder.h"
+#include "synth/tubes.h"
 
 namespace dlsd {
 namespace {
@@ -25,8 +26,12 @@ constexpr double kShortest = 1e-5;
 /// What an edge looks like from a light.
 class LightView {
  public:
-  LightView(const Scene& scene, const Raycaster& raycaster, const Light& light)
-      : scene_(scene), raycaster_(raycaster), light_(light), triangles_(scene.faces.size()) {
+  LightView(const Scene& scene, const Raycaster& raycaster, int light_index)
+      : scene_(scene),
+        raycaster_(raycaster),
+        light_index_(light_index),
+        light_(scene.lights[static_cast<size_t>(light_index)]),
+        triangles_(scene.faces.size()) {
     for (size_t t = 0; t < scene.triangles.size(); ++t) {
       triangles_[static_cast<size_t>(scene.triangles[t].face)].push_back(t);
     }
@@ -35,7 +40,9 @@ class LightView {
     }
     for (size_t i = 0; i < scene.edges.size(); ++i) {
       const Edge& edge = scene.edges[i];
-      if (edge.source == EdgeSource::kFaces && (looks(edge.face0) || looks(edge.face1))) {
+      const bool ends_face =
+          edge.source == EdgeSource::kFaces && (looks(edge.face0) || looks(edge.face1));
+      if (ends_face || isSideFromHere(edge)) {
         borders_.push_back({edge.from, edge.to, planeNormal(edge)});
       }
     }
@@ -43,34 +50,41 @@ class LightView {
 
   [[nodiscard]] bool looks(int face) const { return looks_[static_cast<size_t>(face)] != 0; }
 
+  /// Whether the edge casts a border: a solid ends there, as seen from the light; or the middle of
+  /// a rod's shadow.
+  [[nodiscard]] bool casts(const Edge& edge) const {
+    if (edge.source == EdgeSource::kFaces) return looks(edge.face0) != looks(edge.face1);
+    return edge.source == EdgeSource::kRodCentre || isSideFromHere(edge);
+  }
+
   /// The edge's shadow borders, appended to `out`.
-  void project(int index, int light_index, std::vector<Edge>* out) const {
+  void project(int index, std::vector<Edge>* out) const {
     const Edge& edge = scene_.edges[static_cast<size_t>(index)];
     const std::vector<double> cuts = cutsOf(edge);
-    int last_face = -1;
+    Hit last;
     double begin = 0, end = 0;
     const auto finish = [&] {
-      if (last_face < 0) return;
-      const Face& face = scene_.faces[static_cast<size_t>(last_face)];
-      const auto a = shadowOnFace(light_, pointAt(edge, begin), face);
-      const auto b = shadowOnFace(light_, pointAt(edge, end), face);
-      if (!a || !b || !((*a - *b).norm() > kShortest)) return;
+      if (last.kind == HitKind::kNothing) return;
       Edge border;
-      border.from = *a;
-      border.to = *b;
       border.source = EdgeSource::kShadow;
-      border.face0 = last_face;
+      (last.kind == HitKind::kFace ? border.face0 : border.disc) = last.index;
       border.rod = edge.rod;
       border.caster = index;
-      border.light = light_index;
+      border.light = light_index_;
+      const LitPlane plane = litPlaneOf(scene_, border);
+      const auto a = shadowOnPlane(light_, pointAt(edge, begin), plane);
+      const auto b = shadowOnPlane(light_, pointAt(edge, end), plane);
+      if (!a || !b || !((*a - *b).norm() > kShortest)) return;
+      border.from = *a;
+      border.to = *b;
       out->push_back(border);
     };
     for (size_t k = 0; k + 1 < cuts.size(); ++k) {
-      const int face = faceBehind(edge, pointAt(edge, (cuts[k] + cuts[k + 1]) / 2));
-      if (face != last_face) {
+      const Hit behind = planeBehind(edge, pointAt(edge, (cuts[k] + cuts[k + 1]) / 2));
+      if (behind.kind != last.kind || behind.index != last.index) {
         finish();
         begin = cuts[k];
-        last_face = face;
+        last = behind;
       }
       end = cuts[k + 1];
     }
@@ -87,6 +101,9 @@ class LightView {
     return edge.from + s * (edge.to - edge.from);
   }
 
+  [[nodiscard]] bool isSideFromHere(const Edge& edge) const {
+    return edge.source == EdgeSource::kRodSide && edge.light == light_index_;
+  }
   [[nodiscard]] bool isSun() const { return light_.kind == Light::Kind::kSun; }
   /// Not of unit length for lamps.
   [[nodiscard]] Vector3d toLight(const Vector3d& point) const {
@@ -130,6 +147,7 @@ class LightView {
       addSphere(edge, sphere.centre.cast<double>(), static_cast<double>(sphere.radius), add);
     }
     for (const Disc& disc : scene_.discs) addDisc(edge, disc, add);
+    for (const Tube& tube : scene_.tubes) addTube(edge, tube, add);
     cuts.push_back(0);
     cuts.push_back(1);
     std::sort(cuts.begin(), cuts.end());
@@ -206,12 +224,43 @@ class LightView {
              add);
   }
 
-  [[nodiscard]] bool belongsTo(int face, const Edge& edge) const {
-    if (edge.source == EdgeSource::kRodCentre) {
-      const Rod& rod = scene_.rods[static_cast<size_t>(edge.rod)];
-      return face >= rod.first_face && face < rod.first_face + rod.face_count;
+  template <class Add>
+  void addTube(const Edge& edge, const Tube& tube, const Add& add) const {
+    const Vector3d normal = planeNormal(edge), d = edge.to - edge.from;
+    if (isSun()) {
+      // Fractions between which the edge's part square to the sun is within the ball's.
+      const Vector3d d1 = d - light_.place * light_.place.dot(d);
+      const auto covered = [&](const Vector3d& c) -> std::array<double, 2> {
+        const Vector3d m = edge.from - c, m1 = m - light_.place * light_.place.dot(m);
+        const double a = d1.squaredNorm(), at = -d1.dot(m1) / a;
+        const double disc = at * at - (m1.squaredNorm() - tube.radius * tube.radius) / a;
+        const double half = std::sqrt(std::max(0.0, disc));
+        return {at - half, at + half};
+      };
+      if (d1.squaredNorm() > 0) {
+        addTubeEvents(tube, normal, normal.dot(edge.from), covered, add);
+      }
+      return;
     }
-    return face == edge.face0 || face == edge.face1;
+    // Angles around the lamp, from the edge's middle; they jump behind the lamp.
+    const Vector3d x = ((edge.from + edge.to) / 2 - light_.place).normalized(), y = normal.cross(x);
+    const auto covered = [&](const Vector3d& centre) -> std::array<double, 2> {
+      const Vector3d c = centre - light_.place;
+      const double rest2 = c.squaredNorm() - tube.radius * tube.radius;
+      const double ratio = std::sqrt(std::max(0.0, rest2)) / std::hypot(x.dot(c), y.dot(c));
+      const double at = std::atan2(y.dot(c), x.dot(c)), half = std::acos(std::min(1.0, ratio));
+      return {at - half, at + half};
+    };
+    addTubeEvents(tube, normal, normal.dot(light_.place), covered, [&](double phi) {
+      add(fractionTowards(edge, light_.place + std::cos(phi) * x + std::sin(phi) * y));
+    });
+  }
+
+  [[nodiscard]] bool belongsTo(const Hit& hit, const Edge& edge) const {
+    if (edge.source == EdgeSource::kRodCentre || edge.source == EdgeSource::kRodSide) {
+      return isOnRod(hit, scene_, edge.rod);
+    }
+    return hit.kind == HitKind::kFace && (hit.index == edge.face0 || hit.index == edge.face1);
   }
   [[nodiscard]] bool contains(int face, const Edge& edge) const {
     const Face& f = scene_.faces[static_cast<size_t>(face)];
@@ -223,7 +272,9 @@ class LightView {
   [[nodiscard]] bool standsOnFace(const Edge& edge, const Vector3d& point) const {
     for (size_t f = 0; f < scene_.faces.size(); ++f) {
       const int face = static_cast<int>(f);
-      if (!looks(face) || belongsTo(face, edge) || !contains(face, edge)) continue;
+      if (!looks(face) || belongsTo({HitKind::kFace, face, 0}, edge) || !contains(face, edge)) {
+        continue;
+      }
       const Vector3d& normal = scene_.faces[f].normal;
       for (const size_t t : triangles_[f]) {
         bool inside = true;
@@ -241,9 +292,9 @@ class LightView {
     return scene_.vertices[static_cast<size_t>(v)].cast<double>();
   }
 
-  /// The face onto which a point of the edge casts its shadow, -1 if there is none: the point is in
-  /// the dark, or stands on the face behind it.
-  [[nodiscard]] int faceBehind(const Edge& edge, const Vector3d& point) const {
+  /// The face or disc onto which a point of the edge casts its shadow; nothing if the point is in
+  /// the dark, stands on the face behind it, or has something curved or nothing behind it.
+  [[nodiscard]] Hit planeBehind(const Edge& edge, const Vector3d& point) const {
     constexpr double kSunDistance = 64;  // m, as in Shader.
     const Vector3d start =
         roundToFloat(isSun() ? Vector3d(point + kSunDistance * light_.place) : light_.place);
@@ -256,24 +307,28 @@ class LightView {
       const auto end = static_cast<float>(to);
       while (begin < end) {
         const Hit hit = raycaster_.cast(start.cast<float>(), direction.cast<float>(), begin, end);
-        const bool skip = hit.kind == HitKind::kFace && (!looks(hit.index) || ignores(hit.index));
-        if (!skip) return hit;
+        if (hit.kind == HitKind::kNothing) return hit;
+        const bool from_behind = hit.kind == HitKind::kFace && !looks(hit.index);
+        if (!from_behind && !ignores(hit)) return hit;
         begin = std::max(hit.distance * (1 + 1e-6F),
                          std::nextafter(hit.distance, std::numeric_limits<float>::infinity()));
       }
       return {};
     };
     // Faces through the edge don't hide it.
-    const auto isHere = [&](int face) { return belongsTo(face, edge) || contains(face, edge); };
-    if (first(0, distance - margin, isHere).kind != HitKind::kNothing) return -1;
-    if (standsOnFace(edge, point)) return -1;
-    const auto isOwn = [&](int face) { return belongsTo(face, edge); };
+    const auto isHere = [&](const Hit& hit) {
+      return belongsTo(hit, edge) || (hit.kind == HitKind::kFace && contains(hit.index, edge));
+    };
+    if (first(0, distance - margin, isHere).kind != HitKind::kNothing) return {};
+    if (standsOnFace(edge, point)) return {};
+    const auto isOwn = [&](const Hit& hit) { return belongsTo(hit, edge); };
     const Hit hit = first(distance + margin, std::numeric_limits<double>::infinity(), isOwn);
-    return hit.kind == HitKind::kFace ? hit.index : -1;
+    return hit.kind == HitKind::kFace || hit.kind == HitKind::kDisc ? hit : Hit();
   }
 
   const Scene& scene_;
   const Raycaster& raycaster_;
+  int light_index_;
   const Light& light_;
   std::vector<char> looks_;  ///< Per face: at the light.
   std::vector<Border> borders_;
@@ -282,32 +337,66 @@ class LightView {
 
 }  // namespace
 
-std::optional<Vector3d> shadowOnFace(const Light& light, const Vector3d& point, const Face& face) {
+LitPlane litPlaneOf(const Scene& scene, const Edge& shadow) {
+  if (shadow.disc < 0) {
+    const Face& face = scene.faces[static_cast<size_t>(shadow.face0)];
+    return {face.origin, face.normal};
+  }
+  // Discs have two sides.
+  const Disc& disc = scene.discs[static_cast<size_t>(shadow.disc)];
+  const Light& light = scene.lights[static_cast<size_t>(shadow.light)];
+  const Vector3d centre = disc.centre.cast<double>(), normal = disc.normal.cast<double>();
+  const bool is_sun = light.kind == Light::Kind::kSun;
+  const double height = normal.dot(is_sun ? light.place : Vector3d(light.place - centre));
+  return {centre, height < 0 ? Vector3d(-normal) : normal};
+}
+
+std::optional<Vector3d> shadowOnPlane(const Light& light,
+                                      const Vector3d& point,
+                                      const LitPlane& plane) {
   const bool is_sun = light.kind == Light::Kind::kSun;
   const Vector3d way = is_sun ? Vector3d(-light.place) : Vector3d(point - light.place);
-  const double cosine = -face.normal.dot(way), height = face.normal.dot(point - face.origin);
+  const double cosine = -plane.normal.dot(way), height = plane.normal.dot(point - plane.origin);
   if (!(cosine > kGrazing * way.norm()) || !(height > -kInPlane)) return std::nullopt;
   return Vector3d(point + height / cosine * way);
+}
+
+void addRodSidesFromLights(Scene* scene) {
+  for (size_t k = 0; k < scene->lights.size(); ++k) {
+    const Light& light = scene->lights[k];
+    if (!light.casts_shadows) continue;
+    for (size_t r = 0; r < scene->rods.size(); ++r) {
+      const Rod& rod = scene->rods[r];
+      if (!rod.isRound()) continue;
+      const bool is_sun = light.kind == Light::Kind::kSun;
+      for (const auto& [from, to] :
+           is_sun ? sidesFromSun(rod, light.place) : sidesFrom(rod, light.place)) {
+        Edge edge;
+        edge.from = from;
+        edge.to = to;
+        edge.source = EdgeSource::kRodSide;
+        edge.rod = static_cast<int>(r);
+        edge.light = static_cast<int>(k);
+        scene->edges.push_back(edge);
+      }
+    }
+  }
 }
 
 std::vector<Edge> shadowEdges(const Scene& scene, const Raycaster& raycaster) {
   std::vector<Edge> all;
   for (size_t k = 0; k < scene.lights.size(); ++k) {
-    const Light& light = scene.lights[k];
-    if (!light.casts_shadows) continue;
-    const LightView view(scene, raycaster, light);
+    if (!scene.lights[k].casts_shadows) continue;
+    const LightView view(scene, raycaster, static_cast<int>(k));
     for (size_t i = 0; i < scene.edges.size(); ++i) {
-      const Edge& edge = scene.edges[i];
-      const bool ends_solid =
-          edge.source == EdgeSource::kFaces && view.looks(edge.face0) != view.looks(edge.face1);
-      if (!ends_solid && edge.source != EdgeSource::kRodCentre) continue;
-      view.project(static_cast<int>(i), static_cast<int>(k), &all);
+      if (view.casts(scene.edges[i])) view.project(static_cast<int>(i), &all);
     }
   }
   return all;
 }
 
 void addShadowEdges(const Raycaster& raycaster, Scene* scene) {
+  addRodSidesFromLights(scene);
   const std::vector<Edge> shadows = shadowEdges(*scene, raycaster);
   if (shadows.empty()) return;
   scene->edges.insert(scene->edges.end(), shadows.begin(), shadows.end());

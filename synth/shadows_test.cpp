@@ -12,6 +12,7 @@
 #include "synth/render.h"
 #include "synth/scene_builder.h"
 #include "synth/test_cameras.h"
+#include "synth/visibility_oracle.h"
 
 namespace dlsd {
 namespace {
@@ -45,7 +46,8 @@ SceneBuilder emptyRoom() {
   return builder;
 }
 
-/// Boxes, one of them on the floor, one on top of it; a turned one; a rod, a ball and a disc.
+/// Boxes, one of them on the floor, one on top of it; a turned one; a rod, a ball, a disc, a
+/// cylinder, a ring and a string.
 Scene clutteredRoom(const Light& light) {
   SceneBuilder builder = emptyRoom();
   builder.addBox(Frame3(), {2, 2, 1}, {3, 4, 1.5}, {0.7, 0});
@@ -58,14 +60,30 @@ Scene clutteredRoom(const Light& light) {
   builder.addRod({3, 4.5, 0.4}, {5, 3, 2.2}, 0.02, 8, {0.2, 0});
   builder.addSphere({2.6, 2.9, 2.2}, 0.3, {0.6, 0});
   builder.addDisc({4, 3.2, 2.4}, Vector3d(0.2, 0.1, 1).normalized(), 0.3, {0.6, 0});
+  builder.addDisc({2.3, 3.6, 0.5}, Vector3d(0.1, 0.2, 1).normalized(), 0.6, {0.6, 0});
+  builder.addRoundRod({2.2, 4.9, 1.1}, {4.1, 5.2, 1.6}, 0.12, {0.6, 0});
+  Tube ring;
+  ring.centre = {2.1, 3.1, 1.9};
+  ring.x = {0.3, 0, 0.1};
+  ring.y = {0, std::sqrt(0.1), 0};
+  ring.radius = 0.06;
+  builder.addTube(ring, {0.6, 0});
+  Tube string;
+  string.kind = Tube::Kind::kString;
+  string.centre = {2.9, 3.4, 1.7};
+  string.x = {0.8, 0.5, 0.1};
+  string.y = {0, 0, 0.4};
+  string.radius = 0.02;
+  builder.addTube(string, {0.6, 0});
   builder.finish();
   builder.scene.ambient_up = builder.scene.ambient_down = 0.2;
   builder.scene.lights = {light};
+  addRodSidesFromLights(&builder.scene);
   return std::move(builder.scene);
 }
 
 /// Is the light hidden at a point of a face? By the scene's triangles that look at the light, its
-/// spheres and discs, in double; nothing of Embree.
+/// round things, in double; nothing of Embree.
 bool isDark(const Scene& scene, const Light& light, const Vector3d& point) {
   const bool is_sun = light.kind == Light::Kind::kSun;
   const Vector3d way = is_sun ? Vector3d(50 * light.place) : Vector3d(light.place - point);
@@ -96,7 +114,12 @@ bool isDark(const Scene& scene, const Light& light, const Vector3d& point) {
       return true;
     }
   }
-  return false;
+  return std::any_of(scene.rods.begin(),
+                     scene.rods.end(),
+                     [&](const Rod& r) { return r.isRound() && meetsCylinder(r, point, way); }) ||
+         std::any_of(scene.tubes.begin(), scene.tubes.end(), [&](const Tube& t) {
+           return meetsTube(t, point, way);
+         });
 }
 
 bool isMiddle(const Scene& scene, const Edge& edge) {
@@ -105,19 +128,22 @@ bool isMiddle(const Scene& scene, const Edge& edge) {
 
 // On one side there is light, on the other there is none.
 TEST(ShadowEdges, PartLightFromDarkness) {
+  size_t all_on_discs = 0;
   for (const Light& light : {lamp(), sun()}) {
     const Scene scene = clutteredRoom(light);
     const Raycaster raycaster(scene);
     const std::vector<Edge> shadows = shadowEdges(scene, raycaster);
-    size_t checked = 0, wrong = 0;
+    size_t checked = 0, wrong = 0, of_cylinder = 0, on_discs = 0;
     for (const Edge& edge : shadows) {
       ASSERT_EQ(edge.source, EdgeSource::kShadow);
-      const Face& face = scene.faces[static_cast<size_t>(edge.face0)];
+      on_discs += edge.disc >= 0 ? 1 : 0;
+      const LitPlane face = litPlaneOf(scene, edge);
       const Vector3d d = edge.to - edge.from;
       for (const Vector3d& end : {edge.from, edge.to}) {
         EXPECT_NEAR(face.normal.dot(end - face.origin), 0, 1e-9);
       }
       if (isMiddle(scene, edge)) continue;
+      of_cylinder += edge.rod >= 0 && scene.rods[static_cast<size_t>(edge.rod)].isRound() ? 1 : 0;
       const Vector3d across = face.normal.cross(d).normalized();
       for (int k = 0; k < 20; ++k) {
         const Vector3d point = edge.from + (k + 0.5) / 20 * d;
@@ -130,8 +156,11 @@ TEST(ShadowEdges, PartLightFromDarkness) {
     }
     EXPECT_GT(shadows.size(), 30U);
     EXPECT_GT(checked, 500U);
+    EXPECT_GE(of_cylinder, 2U);
+    all_on_discs += on_discs;
     EXPECT_EQ(wrong, 0U);
   }
+  EXPECT_GT(all_on_discs, 0U);
 }
 
 // Along random lines on the floor, light begins and ends at the borders, or at what is round.
@@ -140,6 +169,11 @@ TEST(ShadowEdges, AreComplete) {
     Scene scene = clutteredRoom(light);
     scene.spheres.clear();
     scene.discs.clear();
+    scene.tubes.clear();
+    std::erase_if(scene.edges, [&](const Edge& e) {
+      return e.rod >= 0 && scene.rods[static_cast<size_t>(e.rod)].isRound();
+    });
+    std::erase_if(scene.rods, [](const Rod& rod) { return rod.isRound(); });
     const Raycaster raycaster(scene);
     const std::vector<Edge> shadows = shadowEdges(scene, raycaster);
     const Random random(5, 2);
@@ -213,6 +247,7 @@ struct Made {
 };
 Made makeWithShadows(Scene scene, const Camera& camera, const Pose& pose) {
   const Raycaster raycaster(scene);
+  addRodSides(pose.position_in_world, &scene);
   addShadowEdges(raycaster, &scene);
   const Shader shader(scene, &raycaster);
   const auto spans = visibleSpans(scene, raycaster, camera, pose);
@@ -233,18 +268,19 @@ TEST(ShadowLabels, HaveTheirContrast) {
     const Edge& edge = made.scene.edges[static_cast<size_t>(line.edge)];
     // Light falls onto white with 0.5 * 0.6 / (1 + ..) at most.
     // Grazing light is faint.
-    EXPECT_GT(line.contrast, edge.face0 < 6 ? 1 : 0.01) << "line " << line.id;
+    const bool of_room = edge.face0 >= 0 && edge.face0 < 6;
+    EXPECT_GT(line.contrast, of_room ? 1 : 0.01) << "line " << line.id;
     EXPECT_LT(line.contrast, 0.5 * 0.6 * 255);
     EXPECT_GE(line.contrast, line.contrast_min);
     if (isMiddle(made.scene, edge)) continue;
     const Vector3d middle = (line.points_in_cam[0] + line.points_in_cam[1]) / 2;
     const Vector3d point = pose.cam_from_world.transpose() * middle + pose.position_in_world;
-    const Face& face = made.scene.faces[static_cast<size_t>(edge.face0)];
+    const LitPlane face = litPlaneOf(made.scene, edge);
     const Vector3d to_light = light.place - point;
     const double d2 = to_light.squaredNorm();
     const double expected = 255 * 0.5 * 0.6 * face.normal.dot(to_light.normalized()) / (1 + d2 / 9);
     // The mean along the line against its middle, on surfaces of albedo 0.5.
-    if (edge.face0 < 6) {
+    if (of_room) {
       EXPECT_NEAR(line.contrast, expected, 0.25 * expected + 0.5) << line.id;
     }
   }

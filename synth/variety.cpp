@@ -3,6 +3,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
+#include <charconv>
 #include <cmath>
 #include <limits>
 #include <optional>
@@ -16,6 +17,8 @@
 #include "synth/dataset/random.h"
 #include "synth/random_shapes.h"
 #include "synth/raycaster.h"
+#include "synth/scene_builder.h"
+#include "synth/tubes.h"
 
 namespace dlsd {
 namespace {
@@ -56,18 +59,60 @@ double distanceToTriangle(const Vector3d& p, const std::array<Vector3d, 3>& corn
   return inside ? std::abs(n.dot(p - corners[0])) : border;
 }
 
-/// Puts round things where there is room for them.
+/// Puts things where there is room for them.
 class Decorator {
  public:
   Decorator(Random* random, SceneView* view)
-      : random_(*random), scene_(view->scene), eye_(view->pose.position_in_world) {}
+      : random_(*random),
+        view_(*view),
+        builder_(std::move(view->scene)),
+        scene_(builder_.scene),
+        eye_(view->pose.position_in_world) {}
+  /// Gives the scene back.
+  ~Decorator() {
+    builder_.finish();
+    view_.scene = std::move(scene_);
+  }
+  Decorator(const Decorator&) = delete;
 
-  void addRoundThings(int count) {
+  void addClutter(int count, const VarietyRange& distance_m, const VarietyRange& length_m) {
     const Raycaster raycaster(scene_);
     for (int k = 0; k < count; ++k) {
-      for (int tries = 0; tries < 8; ++tries) {
-        if (addRoundThing(raycaster)) break;
+      for (int tries = 0; tries < kTries; ++tries) {
+        const auto place = drawPlace(raycaster, distance_m);
+        const double length = draw(&random_, length_m);
+        if (place && addClutterThing(*place, length)) break;
       }
+    }
+  }
+
+  void addRoundThings(int count,
+                      const VarietyRange& distance_m,
+                      const std::vector<std::string>& kinds) {
+    const Raycaster raycaster(scene_);
+    for (int k = 0; k < count; ++k) {
+      for (int tries = 0; tries < kTries; ++tries) {
+        const auto place = drawPlace(raycaster, distance_m);
+        const std::string& kind =
+            kinds[static_cast<size_t>(random_.nextInt(0, static_cast<int>(kinds.size()) - 1))];
+        if (place && addRoundThing(*place, kind)) break;
+      }
+    }
+  }
+
+  /// Patterns on surfaces that do not shine.
+  void addTextures(double noise, double wood) {
+    for (Surface& surface : scene_.surfaces) {
+      const bool is_noise = random_.nextBool(noise), is_wood = random_.nextBool(wood);
+      if (surface.emission > 0 || !(is_noise || is_wood)) continue;
+      Texture texture;
+      texture.kind = is_noise ? Texture::Kind::kNoise : Texture::Kind::kWood;
+      texture.axes = drawRotation(&random_);
+      texture.size_m = is_noise ? random_.next(0.05, 0.4) : random_.next(0.03, 0.12);
+      texture.amplitude = is_noise ? random_.next(0.1, 0.4) : random_.next(0.08, 0.3);
+      texture.seed = static_cast<uint64_t>(random_.nextInt(0, 1 << 30));
+      surface.texture = static_cast<int>(scene_.textures.size());
+      scene_.textures.push_back(texture);
     }
   }
 
@@ -96,8 +141,23 @@ class Decorator {
     scene_.surfaces.push_back({albedo, 0});
     return static_cast<int>(scene_.surfaces.size()) - 1;
   }
-  void addBall(const Vector3d& centre, double radius, int surface) {
-    scene_.spheres.push_back({centre.cast<float>(), static_cast<float>(radius), surface});
+  /// A free place, and how large a ball around it is free.
+  struct Place {
+    Vector3d centre;
+    double distance, clearance;
+  };
+
+  std::optional<Place> drawPlace(const Raycaster& raycaster, const VarietyRange& distance_m) {
+    const Vector3d direction = drawDirection(&random_);
+    const Hit hit = raycaster.cast(eye_.cast<float>(), direction.cast<float>(), 0, 100);
+    double farthest = distance_m.hi;
+    if (hit.kind != HitKind::kNothing) {
+      farthest = std::min(farthest, 0.85 * static_cast<double>(hit.distance));
+    }
+    const double distance = random_.next(distance_m.lo, farthest);
+    if (farthest < distance_m.lo) return std::nullopt;
+    const Vector3d centre = eye_ + distance * direction;
+    return Place{centre, distance, 0.95 * clearance(centre)};
   }
 
   /// Distance to the nearest thing.
@@ -118,50 +178,73 @@ class Decorator {
       nearest =
           std::min(nearest, (p - d.centre.cast<double>()).norm() - static_cast<double>(d.radius));
     }
+    for (const Tube& tube : scene_.tubes) {
+      const Vector3d spine = spineAt(tube, nearestOnSpine(tube, p));
+      nearest = std::min(nearest, (p - spine).norm() - tube.radius);
+    }
+    for (const Rod& rod : scene_.rods) {
+      if (rod.isRound())
+        nearest = std::min(nearest, distanceToSegment(p, rod.from, rod.to) - rod.radius);
+    }
+    for (const Light& light : scene_.lights) {
+      if (light.kind == Light::Kind::kPoint)
+        nearest = std::min(nearest, (p - light.place).norm() - 0.05);
+    }
     return nearest;
   }
 
-  bool addRoundThing(const Raycaster& raycaster) {
-    const Vector3d direction = drawDirection(&random_);
-    const double share = random_.next(0.3, 0.85), size = random_.next(0.05, 0.25);
-    const Hit hit = raycaster.cast(eye_.cast<float>(), direction.cast<float>(), 0, 12);
-    const double distance =
-        share * (hit.kind == HitKind::kNothing ? 6.0 : static_cast<double>(hit.distance));
-    const Vector3d centre = eye_ + distance * direction;
-    const double radius = std::min(0.95 * clearance(centre), size * distance);
-    if (radius < 0.02 * distance) return false;
-    const int surface = addSurface(random_.next(0.05, 0.9));
+  bool addClutterThing(const Place& place, double length) {
+    if (random_.nextBool(0.7)) {
+      const Shape shape = drawShape(&random_);
+      const double radius = length / shape.longestEdge();
+      if (radius > place.clearance) return false;
+      addRandomSolid(shape, place.centre, radius, &random_, &builder_);
+      return true;
+    }
+    const double radius = length * random_.next(0.005, 0.04);
+    const Vector3d half = length / 2 * drawDirection(&random_);
+    const int sides = random_.nextBool(0.5) ? 4 : 8;
+    const Surface surface{random_.next(0.05, 0.9), 0};
+    if (half.norm() + radius > place.clearance) return false;
+    builder_.addRod(place.centre - half, place.centre + half, radius, sides, surface);
+    return true;
+  }
+
+  bool addRoundThing(const Place& place, const std::string& kind) {
+    const double radius = std::min(place.clearance, random_.next(0.05, 0.25) * place.distance);
+    const Surface surface{random_.next(0.05, 0.9), 0};
     const Eigen::Matrix3d axes = drawRotation(&random_);
-    const int kind = random_.nextInt(0, 3);
-    if (kind == 0) {
-      addBall(centre, radius, surface);
-    } else if (kind == 1) {
-      scene_.discs.push_back({centre.cast<float>(),
-                              Vector3d(axes.col(2)).cast<float>(),
-                              static_cast<float>(radius),
-                              surface});
-    } else if (kind == 2) {
-      // A ring of balls that look like one body.
-      const double tube = radius * random_.next(0.12, 0.3), ring = radius - tube;
-      const int balls = static_cast<int>(std::ceil(2 * M_PI * ring / (0.4 * tube)));
-      for (int k = 0; k < balls; ++k) {
-        const double a = 2 * M_PI * k / balls;
-        addBall(
-            centre + ring * (std::cos(a) * axes.col(0) + std::sin(a) * axes.col(1)), tube, surface);
-      }
-    } else {
-      // A string that sags like a parabola between two points of the sphere around it.
-      const double tube = radius * random_.next(0.015, 0.05), sag = random_.next(0.2, 0.6);
-      const double half = 0.8 * radius;
+    const double slimness = random_.next(0, 1), form = random_.next(0, 1);
+    if (radius < 0.02 * place.distance) return false;
+    if (kind == "ball") {
+      builder_.addSphere(place.centre, radius, surface);
+    } else if (kind == "disc") {
+      builder_.addDisc(place.centre, axes.col(2), radius, surface);
+    } else if (kind == "ring") {
+      Tube tube;
+      tube.kind = Tube::Kind::kRing;
+      tube.centre = place.centre;
+      tube.radius = radius * (0.12 + 0.23 * slimness);
+      tube.x = axes.col(0) * (radius - tube.radius);
+      tube.y = axes.col(1) * (radius - tube.radius);
+      builder_.addTube(tube, surface);
+    } else if (kind == "string") {
+      // Hung up at two points that may differ in height.
+      Tube tube;
+      tube.kind = Tube::Kind::kString;
+      tube.radius = radius * (0.015 + 0.035 * slimness);
       Vector3d along = axes.col(0);
       along.z() *= 0.3;
-      along.normalize();
-      const int balls = static_cast<int>(std::ceil(2 * half * (1 + sag) / (0.5 * tube)));
-      for (int k = 0; k < balls; ++k) {
-        const double t = 2.0 * k / (balls - 1) - 1;
-        const Vector3d down(0, 0, sag * half * (t * t - 0.5));
-        addBall(centre + t * half * along + down, tube, surface);
-      }
+      tube.x = 0.8 * radius * along.normalized();
+      tube.y = Vector3d::UnitZ() * (0.8 * radius * (0.2 + 0.4 * form));
+      tube.centre = place.centre - tube.y / 2;
+      builder_.addTube(tube, surface);
+    } else {
+      const double half = radius * (0.5 + 0.45 * form);
+      const double thickness =
+          std::min(radius * (0.03 + 0.37 * slimness), std::sqrt(radius * radius - half * half));
+      const Vector3d end = axes.col(2) * half;
+      builder_.addRoundRod(place.centre - end, place.centre + end, thickness, surface);
     }
     return true;
   }
@@ -218,7 +301,10 @@ class Decorator {
     }
   }
 
+  static constexpr int kTries = 8;
   Random& random_;
+  SceneView& view_;
+  SceneBuilder builder_;
   Scene& scene_;
   Vector3d eye_;
 };
@@ -227,7 +313,12 @@ const std::vector<std::pair<const char*, VarietyRange SceneVariety::*>>& sceneFi
   static const std::vector<std::pair<const char*, VarietyRange SceneVariety::*>> fields{
       {"contrast", &SceneVariety::contrast},
       {"distractors", &SceneVariety::distractors},
-      {"prints", &SceneVariety::prints}};
+      {"clutter", &SceneVariety::clutter},
+      {"distance_m", &SceneVariety::distance_m},
+      {"length_m", &SceneVariety::length_m},
+      {"prints", &SceneVariety::prints},
+      {"noise", &SceneVariety::noise},
+      {"wood", &SceneVariety::wood}};
   return fields;
 }
 
@@ -261,10 +352,32 @@ void readIntervals(const JsonField& json,
 
 }  // namespace
 
+const std::vector<std::string>& distractorKinds() {
+  static const std::vector<std::string> kinds{"ball", "disc", "ring", "string", "cylinder"};
+  return kinds;
+}
+
 void SceneVariety::check() const {
   requireRange("scene.contrast", contrast, 0, 3);
   requireRange("scene.distractors", distractors, 0, 30);
+  requireRange("scene.clutter", clutter, 0, 60);
+  requireRange("scene.distance_m", distance_m, 0.1, 60);
+  requireRange("scene.length_m", length_m, 0.01, 20);
   requireRange("scene.prints", prints, 0, 1);
+  requireRange("scene.noise", noise, 0, 1);
+  requireRange("scene.wood", wood, 0, 1);
+  const auto& known = distractorKinds();
+  for (const std::string& kind : distractor_kinds) {
+    if (std::find(known.begin(), known.end(), kind) != known.end() &&
+        std::count(distractor_kinds.begin(), distractor_kinds.end(), kind) == 1) {
+      continue;
+    }
+    throw std::invalid_argument("scene.distractor_kinds has \"" + kind +
+                                "\": allowed are ball, disc, ring, string, cylinder, each once");
+  }
+  if (distractor_kinds.empty()) {
+    throw std::invalid_argument("scene.distractor_kinds is empty: allowed is one kind or more");
+  }
   if (shadows == -1 || (shadows >= 0 && shadows <= 1)) return;
   throw std::invalid_argument("scene.shadows = " + std::to_string(shadows) +
                               " is out of range: allowed are [0, 1] and -1");
@@ -283,6 +396,7 @@ ordered_json toJson(const SceneVariety& variety) {
   for (const auto& [name, member] : sceneFields()) {
     json[name] = {(variety.*member).lo, (variety.*member).hi};
   }
+  json["distractor_kinds"] = variety.distractor_kinds;
   json["shadows"] = variety.shadows;
   return json;
 }
@@ -295,17 +409,28 @@ ordered_json toJson(const CameraVariety& variety) {
   return json;
 }
 
-void readVariety(const std::string& path, SceneVariety* scene_out, CameraVariety* camera_out) {
+namespace {
+
+/// `source` names the document in messages.
+void applyVariety(const nlohmann::json& document,
+                  const std::string& source,
+                  SceneVariety* scene_out,
+                  CameraVariety* camera_out) {
   SceneVariety scene = *scene_out;
   CameraVariety camera = *camera_out;
-  const nlohmann::json document = parseJson(readFile(path), path);
-  const JsonField json(document, path);
+  const JsonField json(document, source);
   if (!document.is_object()) json.fail("must be an object");
   for (const auto& item : document.items()) {
     const JsonField part = json[item.key().c_str()];
     if (item.key() == "scene") {
-      readIntervals(part, sceneFields(), {"shadows"}, &scene);
+      readIntervals(part, sceneFields(), {"shadows", "distractor_kinds"}, &scene);
       if (part.has("shadows")) scene.shadows = part["shadows"].number();
+      if (part.has("distractor_kinds")) {
+        scene.distractor_kinds.clear();
+        for (const JsonField& kind : part["distractor_kinds"].array()) {
+          scene.distractor_kinds.push_back(kind.text());
+        }
+      }
     } else if (item.key() == "camera") {
       readIntervals(part, cameraFields(), {}, &camera);
     } else {
@@ -316,10 +441,51 @@ void readVariety(const std::string& path, SceneVariety* scene_out, CameraVariety
     scene.check();
     camera.check();
   } catch (const std::invalid_argument& e) {
-    throw InputError(path + ": " + e.what());
+    throw InputError(source + ": " + e.what());
   }
   *scene_out = scene;
   *camera_out = camera;
+}
+
+/// "4,12" as an array of numbers; what is no number stays a text.
+nlohmann::json valuesOf(const std::string& text) {
+  nlohmann::json values = nlohmann::json::array();
+  std::istringstream parts(text);
+  for (std::string part; std::getline(parts, part, ',');) {
+    double number = 0;
+    const auto end = std::from_chars(part.data(), part.data() + part.size(), number);
+    const bool is_number = end.ec == std::errc() && end.ptr == part.data() + part.size();
+    values.push_back(is_number ? nlohmann::json(number) : nlohmann::json(part));
+  }
+  return values;
+}
+
+}  // namespace
+
+void readVariety(const std::string& path, SceneVariety* scene, CameraVariety* camera) {
+  applyVariety(parseJson(readFile(path), path), path, scene, camera);
+}
+
+void setVariety(const std::string& assignment, SceneVariety* scene, CameraVariety* camera) {
+  const std::string source = "--set " + assignment;
+  const size_t equals = assignment.find('=');
+  if (equals == std::string::npos) {
+    throw InputError(source + ": has no '=', allowed is NAME=VALUE or NAME=LOW,HIGH");
+  }
+  const std::string name = assignment.substr(0, equals);
+  const nlohmann::json values = valuesOf(assignment.substr(equals + 1));
+  const auto& ranges = cameraFields();
+  const bool of_camera = std::any_of(
+      ranges.begin(), ranges.end(), [&](const auto& field) { return name == field.first; });
+  nlohmann::json value = values;
+  if (name == "shadows" && values.size() == 1) {
+    value = values[0];
+  } else if (name != "distractor_kinds" && values.size() == 1) {
+    value = {values[0], values[0]};
+  }
+  nlohmann::json document;
+  document[of_camera ? "camera" : "scene"][name] = value;
+  applyVariety(document, source, scene, camera);
 }
 
 void addVariety(const SceneVariety& variety, uint64_t seed, uint64_t index, SceneView* view) {
@@ -328,11 +494,19 @@ void addVariety(const SceneVariety& variety, uint64_t seed, uint64_t index, Scen
   Scene& scene = view->scene;
   const double contrast = draw(&random, variety.contrast);
   const int things = static_cast<int>(std::lround(draw(&random, variety.distractors)));
+  const int clutter = static_cast<int>(std::lround(draw(&random, variety.clutter)));
   const double prints = draw(&random, variety.prints);
+  const double noise = draw(&random, variety.noise), wood = draw(&random, variety.wood);
   const bool shadows = random.nextBool(variety.shadows);
-  Decorator decorator(&random, view);
-  if (prints > 0) decorator.addPrints(prints);
-  if (things > 0) decorator.addRoundThings(things);
+  {
+    Decorator decorator(&random, view);
+    if (prints > 0) decorator.addPrints(prints);
+    if (clutter > 0) decorator.addClutter(clutter, variety.distance_m, variety.length_m);
+    if (things > 0) {
+      decorator.addRoundThings(things, variety.distance_m, variety.distractor_kinds);
+    }
+    if (noise > 0 || wood > 0) decorator.addTextures(noise, wood);
+  }
   double mean = 0;
   for (const Surface& s : scene.surfaces)
     mean += s.albedo / static_cast<double>(scene.surfaces.size());

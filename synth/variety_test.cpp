@@ -8,12 +8,13 @@
 #include <fstream>
 
 #include "cameras/calibration/files.h"
+#include "synth/shading.h"
 
 namespace dlsd {
 namespace {
 
 size_t roundThings(const Scene& scene) {
-  return scene.spheres.size() + scene.discs.size();
+  return scene.spheres.size() + scene.discs.size() + scene.tubes.size();
 }
 
 TEST(Variety, ChangesNothingByDefault) {
@@ -58,6 +59,105 @@ TEST(Variety, AddsRoundThingsInTheOpenAndPrints) {
         }
       }
     }
+  }
+}
+
+TEST(Variety, DrawsTheKindsThatAreAskedFor) {
+  const auto viewOf = [](const std::string& kind) {
+    SceneVariety variety;
+    variety.distractors = {8, 8};
+    variety.distractor_kinds = {kind};
+    SceneView view = makeSceneView("corridor", 3, 2);
+    addVariety(variety, 3, 2, &view);
+    return view.scene;
+  };
+  const Scene plain = makeSceneView("corridor", 3, 2).scene;
+  EXPECT_GT(viewOf("ball").spheres.size(), plain.spheres.size() + 3);
+  EXPECT_GT(viewOf("disc").discs.size(), plain.discs.size() + 3);
+  EXPECT_GT(viewOf("cylinder").rods.size(), plain.rods.size() + 3);
+  for (const auto& [name, kind] :
+       {std::pair("ring", Tube::Kind::kRing), {"string", Tube::Kind::kString}}) {
+    const Scene scene = viewOf(name);
+    EXPECT_GT(scene.tubes.size(), 3U);
+    for (const Tube& tube : scene.tubes) EXPECT_EQ(tube.kind, kind);
+    EXPECT_EQ(scene.spheres.size(), plain.spheres.size());
+  }
+}
+
+// Clutter keeps to its distances and lengths; old edges keep their numbers and carriers.
+TEST(Variety, ClutterFollowsItsRanges) {
+  SceneVariety variety;
+  variety.clutter = {20, 20};
+  variety.distance_m = {1, 2};
+  variety.length_m = {0.2, 0.5};
+  size_t added = 0;
+  for (uint64_t index = 0; index < 5; ++index) {
+    const SceneView plain = makeSceneView("corridor", 3, index);
+    SceneView view = plain;
+    addVariety(variety, 3, index, &view);
+    ASSERT_GE(view.scene.edges.size(), plain.scene.edges.size());
+    for (size_t e = 0; e < plain.scene.edges.size(); ++e) {
+      ASSERT_EQ(view.scene.edges[e].from, plain.scene.edges[e].from);
+      EXPECT_EQ(view.scene.edges[e].carrier, plain.scene.edges[e].carrier);
+    }
+    for (size_t p = plain.scene.pieces.size(); p < view.scene.pieces.size(); ++p, ++added) {
+      const SolidPiece& piece = view.scene.pieces[p];
+      const double distance = (piece.centre - view.pose.position_in_world).norm();
+      EXPECT_GE(distance, 0.7);
+      EXPECT_LE(distance, 2.3);
+    }
+    for (size_t e = plain.scene.edges.size(); e < view.scene.edges.size(); ++e) {
+      const Edge& edge = view.scene.edges[e];
+      const double length = (edge.to - edge.from).norm();
+      EXPECT_LE(length, 0.5 + 1e-5);
+    }
+  }
+  EXPECT_GT(added, 15U);
+}
+
+TEST(Variety, TexturesTheirShare) {
+  SceneVariety variety;
+  variety.noise = {0.3, 0.3};
+  variety.wood = {0.5, 0.5};
+  SceneView view = makeSceneView("room", 3, 1);
+  addVariety(variety, 3, 1, &view);
+  double noise = 0, wood = 0;
+  for (const Surface& surface : view.scene.surfaces) {
+    if (surface.texture < 0) continue;
+    const Texture& texture = view.scene.textures[static_cast<size_t>(surface.texture)];
+    (texture.kind == Texture::Kind::kNoise ? noise : wood) += 1;
+  }
+  const auto all = static_cast<double>(view.scene.surfaces.size());
+  EXPECT_NEAR(noise / all, 0.3, 0.1);
+  EXPECT_NEAR(wood / all, 0.7 * 0.5, 0.1);
+}
+
+TEST(Textures, AreSmoothAroundOneAndDifferBySeed) {
+  for (const Texture::Kind kind : {Texture::Kind::kNoise, Texture::Kind::kWood}) {
+    Texture texture;
+    texture.kind = kind;
+    texture.size_m = 0.1;
+    texture.amplitude = 0.4;
+    Texture other = texture;
+    other.seed = 1;
+    double sum = 0, lo = 2, hi = 0, steepest = 0, differ = 0;
+    constexpr int kPoints = 20000;
+    const Eigen::Vector3d step(3e-5, 2e-5, 4e-5);
+    for (int k = 0; k < kPoints; ++k) {
+      const Eigen::Vector3d p = 0.001 * k * Eigen::Vector3d(0.5, 0.7, -0.4);
+      const double value = textureFactor(texture, p);
+      sum += value;
+      lo = std::min(lo, value);
+      hi = std::max(hi, value);
+      steepest = std::max(steepest, std::abs(textureFactor(texture, p + step) - value));
+      differ += std::abs(textureFactor(other, p) - value);
+    }
+    EXPECT_NEAR(sum / kPoints, 1, 0.05);
+    EXPECT_GE(lo, 0.6);
+    EXPECT_LE(hi, 1.4);
+    EXPECT_GT(hi - lo, 0.3);
+    EXPECT_LE(steepest, 0.005);  // 5.4e-5 m: a step would be 0.1 and more.
+    EXPECT_GT(differ / kPoints, 0.05);
   }
 }
 
@@ -150,7 +250,35 @@ TEST(VarietyFile, IsReadAndRefused) {
   EXPECT_THAT(refusal("{\"scene\": {\"contrast\": [1]}}"), testing::HasSubstr("contrast"));
   EXPECT_THAT(refusal("{\"camera\": {\"width_px\": [1, 10]}}"), testing::HasSubstr("width_px"));
   EXPECT_THAT(refusal("[]"), testing::HasSubstr("object"));
+  EXPECT_THAT(refusal(R"({"scene": {"distractor_kinds": ["cube"]}})"), testing::HasSubstr("cube"));
+  EXPECT_THAT(refusal(R"({"scene": {"distractor_kinds": []}})"), testing::HasSubstr("empty"));
+  EXPECT_THAT(refusal(R"({"scene": {"length_m": [0, 1]}})"), testing::HasSubstr("length_m"));
   std::filesystem::remove(path);
+}
+
+TEST(VarietySettings, AreThoseOfTheFile) {
+  SceneVariety scene;
+  CameraVariety camera;
+  setVariety("clutter=4,12", &scene, &camera);
+  setVariety("wood=0.25", &scene, &camera);
+  setVariety("shadows=0.5", &scene, &camera);
+  setVariety("distractor_kinds=ring,cylinder", &scene, &camera);
+  setVariety("field_of_view_deg=90,180", &scene, &camera);
+  EXPECT_EQ(scene.clutter, (VarietyRange{4, 12}));
+  EXPECT_EQ(scene.wood, (VarietyRange{0.25, 0.25}));
+  EXPECT_EQ(scene.shadows, 0.5);
+  EXPECT_EQ(scene.distractor_kinds, (std::vector<std::string>{"ring", "cylinder"}));
+  EXPECT_EQ(camera.field_of_view_deg, (VarietyRange{90, 180}));
+  for (const std::string bad : {"clutter",
+                                "clutter=",
+                                "clutter=a,b",
+                                "clutter=1,2,3",
+                                "clutter=12,4",
+                                "cluttr=1,2",
+                                "=3"}) {
+    EXPECT_THROW(setVariety(bad, &scene, &camera), InputError) << bad;
+  }
+  EXPECT_EQ(scene.clutter, (VarietyRange{4, 12}));
 }
 
 }  // namespace

@@ -2,16 +2,78 @@
 // For tests: visibility by brute force.
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <vector>
 
 #include "synth/scene.h"
+#include "synth/tubes.h"
 
 namespace dlsd {
 
-/// Is the point of the edge hidden? Every triangle, sphere and disc is intersected in double;
-/// nothing of the label code or of Embree is used.
+/// Whether the segment from a point along d comes nearer to a round rod's axis than its radius,
+/// between the caps.
+[[nodiscard]] inline bool meetsCylinder(const Rod& rod,
+                                        const Eigen::Vector3d& from,
+                                        const Eigen::Vector3d& d) {
+  const Eigen::Vector3d axis = (rod.to - rod.from).normalized(), m = from - rod.from;
+  const double length = (rod.to - rod.from).norm();
+  // Distance from the axis along the segment is convex: its least value by ternary search within
+  // the slab between the caps.
+  double lo = 0, hi = 1;
+  const double a0 = axis.dot(m), slope = axis.dot(d);
+  if (slope != 0) {
+    const double s0 = -a0 / slope, s1 = (length - a0) / slope;
+    lo = std::max(lo, std::min(s0, s1));
+    hi = std::min(hi, std::max(s0, s1));
+  } else if (a0 < 0 || a0 > length) {
+    return false;
+  }
+  const auto distance = [&](double s) { return axis.cross(m + s * d).norm(); };
+  for (int k = 0; k < 100 && lo < hi; ++k) {
+    const double p = lo + (hi - lo) / 3, q = hi - (hi - lo) / 3;
+    if (distance(p) < distance(q)) {
+      hi = q;
+    } else {
+      lo = p;
+    }
+  }
+  return lo <= hi && distance((lo + hi) / 2) < rod.radius;
+}
+
+/// Whether the segment from a point along d meets any of a tube's balls: least distance of 600
+/// spine points, refined.
+[[nodiscard]] inline bool meetsTube(const Tube& tube,
+                                    const Eigen::Vector3d& from,
+                                    const Eigen::Vector3d& d) {
+  const auto distance = [&](double t) {
+    const Eigen::Vector3d m = spineAt(tube, t) - from;
+    const double s = std::clamp(m.dot(d) / d.squaredNorm(), 0.0, 1.0);
+    return (m - s * d).norm();
+  };
+  const auto [t0, t1] = spineRange(tube);
+  constexpr int kSteps = 600;
+  const double step = (t1 - t0) / kSteps;
+  const double reach = step * (tube.x.norm() + 2 * tube.y.norm());
+  for (int k = 0; k <= kSteps; ++k) {
+    if (distance(t0 + k * step) > tube.radius + reach) continue;
+    double lo = std::max(t0, t0 + (k - 1) * step), hi = std::min(t1, t0 + (k + 1) * step);
+    for (int i = 0; i < 60; ++i) {
+      const double p = lo + (hi - lo) / 3, q = hi - (hi - lo) / 3;
+      if (distance(p) < distance(q)) {
+        hi = q;
+      } else {
+        lo = p;
+      }
+    }
+    if (distance((lo + hi) / 2) < tube.radius) return true;
+  }
+  return false;
+}
+
+/// Is the point of the edge hidden? Every triangle, sphere, disc, tube and cylinder is intersected
+/// in double; nothing of the label code or of Embree is used, of tubes.h only the spine.
 class VisibilityOracle {
  public:
   VisibilityOracle(const Scene& scene, const Eigen::Vector3d& eye) : scene_(scene), eye_(eye) {
@@ -53,7 +115,17 @@ class VisibilityOracle {
       const double s = (-b - std::sqrt(disc)) / a;
       if (s > 0 && s < kBefore) return true;
     }
-    for (const Disc& disc : scene_.discs) {
+    for (size_t k = 0; k < scene_.rods.size(); ++k) {
+      const Rod& rod = scene_.rods[k];
+      const bool own = isOwnRound(edge, static_cast<int>(k));
+      if (rod.isRound() && !own && meetsCylinder(rod, eye_, d * kBefore)) return true;
+    }
+    for (const Tube& tube : scene_.tubes) {
+      if (meetsTube(tube, eye_, d * kBefore)) return true;
+    }
+    for (size_t k = 0; k < scene_.discs.size(); ++k) {
+      const Disc& disc = scene_.discs[k];
+      if (isOwnCap(edge, static_cast<int>(k)) || static_cast<int>(k) == edge.disc) continue;
       const Eigen::Vector3d n = disc.normal.cast<double>(), centre = disc.centre.cast<double>();
       const double s = n.dot(centre - eye_) / n.dot(d);
       if (s > 0 && s < kBefore &&
@@ -65,6 +137,16 @@ class VisibilityOracle {
   }
 
  private:
+  [[nodiscard]] static bool isOwnRound(const Edge& edge, int rod) {
+    return edge.rod == rod &&
+           (edge.source == EdgeSource::kRodCentre || edge.source == EdgeSource::kRodSide);
+  }
+  [[nodiscard]] bool isOwnCap(const Edge& edge, int disc) const {
+    if (!isOwnRound(edge, edge.rod) || edge.rod < 0) return false;
+    const Rod& rod = scene_.rods[static_cast<size_t>(edge.rod)];
+    return rod.isRound() && (disc == rod.first_disc || disc == rod.first_disc + 1);
+  }
+
   struct Corners {
     std::array<Eigen::Vector3d, 3> p;
     int face = 0;
@@ -76,6 +158,15 @@ class VisibilityOracle {
 
 inline bool looksAway(const Scene& scene, const Edge& edge, const Eigen::Vector3d& eye) {
   if (edge.source == EdgeSource::kRodCentre) return false;
+  if (edge.source == EdgeSource::kRodSide) return edge.light >= 0;
+  if (edge.disc >= 0) {
+    const Disc& disc = scene.discs[static_cast<size_t>(edge.disc)];
+    const Light& light = scene.lights[static_cast<size_t>(edge.light)];
+    const Eigen::Vector3d normal = disc.normal.cast<double>(), centre = disc.centre.cast<double>();
+    const Eigen::Vector3d to_light =
+        light.kind == Light::Kind::kSun ? light.place : Eigen::Vector3d(light.place - centre);
+    return normal.dot(eye - centre) * normal.dot(to_light) <= 0;
+  }
   bool away = true;
   for (const int f : {edge.face0, edge.face1}) {
     if (f < 0) continue;
