@@ -218,7 +218,7 @@ TEST(SynthSuite, LabelsLieOnDiscontinuities) {
     worst.see(static_cast<double>(flat) / checked);
     RC_TAG(c.preset);
     // Something thinner than that, or the next line nearer, may stand beside a point.
-    RC_ASSERT(flat <= 1 + checked / 100);
+    RC_ASSERT(flat <= 1 + checked / 300);
   });
 }
 
@@ -350,16 +350,16 @@ constexpr double kStraightPx = 1e-3;
 constexpr double kLongPx = 20;
 
 /// The longest straight run of jumps, its length and its ends.
-struct Run {
+struct StraightRun {
   double length_px = 0;
   Vector2d from{0, 0}, to{0, 0};
 };
-Run longestStraightRun(const Camera& camera, const std::vector<Jump>& jumps) {
+StraightRun longestStraightRun(const Camera& camera, const std::vector<Jump>& jumps) {
   ImageGrid<size_t> grid(camera, 16);
   for (size_t k = 0; k < jumps.size(); ++k) {
     grid.forEachCell(jumps[k].pixel, jumps[k].pixel, 0, [&](auto& list) { list.push_back(k); });
   }
-  Run longest;
+  StraightRun longest;
   std::vector<std::pair<double, size_t>> along;
   for (const Jump& a : jumps) {
     const auto J = camera.jacobian(a.ray);
@@ -436,7 +436,7 @@ TEST(SynthSuite, LabelsAreComplete) {
       });
       if (!explained) unexplained.push_back(jump);
     }
-    const Run run = longestStraightRun(camera, unexplained);
+    const StraightRun run = longestStraightRun(camera, unexplained);
     RC_LOG() << jumps.size() << " jumps, " << unexplained.size() << " without a label; longest run "
              << run.length_px << " px from " << run.from.transpose() << " to "
              << run.to.transpose();
@@ -541,17 +541,22 @@ struct WorldMap {
 
 void expectSameLabels(const Labels& a, const Labels& b, const auto& mapPixel) {
   RC_ASSERT(a.lines.size() == b.lines.size());
+  size_t other_contrast = 0;
   for (size_t i = 0; i < a.lines.size(); ++i) {
     const LabelLine &p = a.lines[i], &q = b.lines[i];
     RC_ASSERT(p.edge == q.edge);
     RC_ASSERT(p.kind == q.kind);
     RC_ASSERT(p.ends == q.ends);
     RC_ASSERT(std::abs(p.angle_rad - q.angle_rad) <= 1e-9);
-    // Where something begins within 2e-4 rad of the line, its contrast depends on the last bit.
-    RC_ASSERT(std::abs(p.contrast - q.contrast) <= 0.5 + 0.1 * p.contrast);
+    // Where something begins 2e-4 rad from the line, one of its places depends on the last bit.
+    const double difference = std::abs(p.contrast - q.contrast);
+    RC_ASSERT(difference <= 0.5 + 255.0 / kContrastPlaces);
+    other_contrast += difference <= 0.5 + 0.1 * p.contrast ? 0 : 1;
     RC_ASSERT((mapPixel(p.points.front()) - q.points.front()).norm() <= 1e-5);
     RC_ASSERT((mapPixel(p.points.back()) - q.points.back()).norm() <= 1e-5);
   }
+  RC_LOG() << other_contrast << " of " << a.lines.size() << " labels have another contrast\n";
+  RC_ASSERT(other_contrast <= 1 + a.lines.size() / 200);
   RC_ASSERT(a.junctions.size() == b.junctions.size());
 }
 

@@ -458,7 +458,7 @@ class FineSampler {
     if ((may_stop || borders[0] != nullptr) && batch_.count() == kFineSamples) {
       gather(0, Raycaster::kPacket);
       shade();
-      if (may_stop && share_count_ > 1 && spread() <= kStep) {
+      if (may_stop && share_count_ > 1 && allFlat() && spread() <= kStep) {
         samples = Raycaster::kPacket;
       } else {
         if (borders[0] == nullptr || !gatherBySide(borders)) {
@@ -623,6 +623,12 @@ class FineSampler {
     }
   }
 
+  /// Whether one radiance stands for all samples of each surface.
+  [[nodiscard]] bool allFlat() const {
+    return std::all_of(shares_.begin(),
+                       shares_.begin() + static_cast<std::ptrdiff_t>(share_count_),
+                       [](const Share& share) { return share.one_for_all; });
+  }
   /// Difference between the brightest and the darkest surface.
   [[nodiscard]] float spread() const {
     float lo = shares_[0].radiance, hi = lo;
@@ -846,7 +852,8 @@ Rendering renderRadiance(const Scene& scene,
     for (int j = first; j < end; ++j) {
       for (int i = 0; i < width; ++i) {
         const size_t pixel = static_cast<size_t>(j) * w + static_cast<size_t>(i);
-        if (!needsFineLook(pixels, width, height, i, j)) {
+        if (!needsFineLook(pixels, width, height, i, j) &&
+            !shader.isTextured(pixels.sight[pixel])) {
           constants[pixel] = pixels.radiance[pixel];
           continue;
         }

@@ -88,7 +88,8 @@ struct Rendering {
 ///
 /// Where surfaces may meet is known before a ray is cast: along the curves of the spans, and the
 /// outlines of spheres, discs and elliptic decals. These pixels, the rim of the camera's domain,
-/// and pixels that differ from a neighbour (where round things enter others) get kFineSamples
+/// those that show a pattern, and pixels that differ from a neighbour (where round things enter
+/// others) get kFineSamples
 /// samples in a rank-1 lattice, mirrored and shifted by a hash of (key, pixel); a fourth of them if
 /// at most one curve passes and the step between the surfaces is at most 2 grey levels. Where
 /// nothing but one or two straight edges passes and a fourth of the samples show one surface on
