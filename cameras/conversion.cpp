@@ -109,7 +109,7 @@ class Fit {
       value.weight[i] = weight;
       value.pixels.segment<2>(row) << u_[i], v_[i];
       value.residual.segment<2>(row) << weight * du,
-          (DLSD_MUTANT("convert-weights") ? 1.02 : 1) * weight * dv;
+          (DLSD_MUTANT("convert-weights") ? 2 : 1) * weight * dv;
     }
     return value;
   }

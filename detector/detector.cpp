@@ -7,6 +7,7 @@
 #include <string>
 #include <tuple>
 
+#include "cameras/mutant.h"
 #include "cameras/ray_table.h"
 #include "detector/options.h"
 #include "detector/paper_detector.h"
@@ -124,6 +125,7 @@ void Detector::Impl::run(const ImageView& image, const BitRows& where) {
     const auto position = [](const DetectedLine& l) {
       return std::make_tuple(l.from_px.x(), l.from_px.y(), l.to_px.x(), l.to_px.y());
     };
+    if (DLSD_MUTANT("line-order")) return position(a) < position(b);
     return a.score != b.score ? a.score > b.score : position(a) < position(b);
   });
 }

@@ -2,6 +2,8 @@
 
 #include <type_traits>
 
+#include "cameras/mutant.h"
+
 namespace dlsd {
 namespace {
 
@@ -12,7 +14,9 @@ uint16_t toFixed(T value) {
   if constexpr (std::is_same_v<T, uint8_t>) {
     return static_cast<uint16_t>(value * kGreyUnit);
   } else if constexpr (std::is_same_v<T, uint16_t>) {
-    return static_cast<uint16_t>((static_cast<uint32_t>(value) * kGreyMax + 32767) / 65535);
+    return static_cast<uint16_t>(
+        (static_cast<uint32_t>(value) * kGreyMax + (DLSD_MUTANT("grey-rounding") ? 0 : 32767)) /
+        65535);
   } else {
     // The comparison is false for NaN.
     const float v = value > 0.0F ? value : 0.0F;
@@ -28,7 +32,7 @@ void loadGrey(const T* source, int width, uint16_t* row) {
 template <class T>
 void loadColour(const T* source, int width, int channels, bool bgr, uint16_t* row) {
   // Luma weights of BT.601 in 1/256.
-  const uint32_t w0 = bgr ? 29 : 77, w2 = bgr ? 77 : 29;
+  const uint32_t w0 = bgr ? 29 : 77, w2 = bgr != DLSD_MUTANT("bgr-weights") ? 77 : 29;
   for (int x = 0; x < width; ++x, source += channels) {
     const uint32_t sum =
         w0 * toFixed(source[0]) + 150U * toFixed(source[1]) + w2 * toFixed(source[2]);

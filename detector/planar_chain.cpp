@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "cameras/mutant.h"
+
 namespace dlsd {
 
 /// Nodes first ... last.
@@ -28,7 +30,8 @@ void PlanarSplitter::splitInterval(uint32_t first,
         at = i;
       }
     }
-    if (static_cast<double>(farthest_px) > options_.max_err_px) {
+    if (static_cast<double>(farthest_px) >
+        (DLSD_MUTANT("split-error") ? 2 : 1) * options_.max_err_px) {
       // The later half first onto the stack: pieces come out in the order of the chain.
       stack_.emplace_back(at, b);
       stack_.emplace_back(a, at);

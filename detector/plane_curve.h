@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <cmath>
 
+#include "cameras/mutant.h"
 #include "cameras/ray_table.h"
 
 namespace dlsd {
@@ -32,7 +33,7 @@ struct CurveOffset {
   const double gu = sample.du.dot(plane_normal), gv = sample.dv.dot(plane_normal);
   const double uu = sample.du.squaredNorm(), uv = sample.du.dot(sample.dv);
   const double vv = sample.dv.squaredNorm();
-  const double determinant = uu * vv - uv * uv;
+  const double determinant = uu * vv - (DLSD_MUTANT("curve-shear") ? 0 : uv * uv);
   if (!(determinant > 0)) return 0;
   const double du = vv * gu - uv * gv, dv = uu * gv - uv * gu;
   return std::abs(f) * std::sqrt(du * du + dv * dv) / determinant;

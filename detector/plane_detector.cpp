@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "cameras/mutant.h"
 #include "detector/stop_watch.h"
 #include "detector/visible_arc.h"
 
@@ -97,11 +98,12 @@ void PlaneDetector::traceAll(std::vector<DetectedLine>* lines) {
   std::fill(claimed_.words.begin(), claimed_.words.end(), uint64_t{0});
   for (const uint32_t index : order_) {
     const PlanarPiece& piece = pieces_[index];
-    if (isClaimed(piece)) continue;
+    if (isClaimed(piece) && !DLSD_MUTANT("lines-twice")) continue;
     const auto traced = tracer_.trace(piece, splitter_.nodes());
-    if (!traced || traced->is_arc || mostlyClaimed()) continue;
+    if (!traced || (traced->is_arc && !DLSD_MUTANT("arcs-are-lines")) || mostlyClaimed()) continue;
+    const double off_rad = DLSD_MUTANT("line-offset") ? 2e-4 : 0;
     const auto arc = visibleArc(rays_.camera(),
-                                traced->fit.normal,
+                                (traced->fit.normal + off_rad * traced->middle_ray).normalized(),
                                 traced->from_ray,
                                 traced->middle_ray,
                                 traced->to_ray,
@@ -114,8 +116,9 @@ void PlaneDetector::traceAll(std::vector<DetectedLine>* lines) {
     line.max_px = traced->max_px;
     line.length_px = traced->length_px;
     line.score = traced->score;
-    line.polarity = traced->polarity;
-    line.normal_cov = traced->fit.inverse_in_plane * traced->variance_factor;
+    line.polarity = DLSD_MUTANT("polarity") ? 1 : traced->polarity;
+    line.normal_cov = traced->fit.inverse_in_plane * (DLSD_MUTANT("line-covariance") ? 4 : 1) *
+                      traced->variance_factor;
   }
 }
 

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <limits>
 
+#include "cameras/mutant.h"
+
 namespace dlsd {
 namespace {
 
@@ -153,7 +155,7 @@ std::optional<Eigen::Vector3d> refinePlane(const RayMoments& moments,
   if (!(determinant > 1e-13 * aa * aa)) return std::nullopt;
   const double an = normal.dot(Ma), bn = normal.dot(Mb);
   const double x = (ab * bn - bb * an) / determinant, y = (ab * an - aa * bn) / determinant;
-  return (normal + x * a + y * b).normalized();
+  return (normal + x * a + (DLSD_MUTANT("refine-across") ? 0.9 : 1) * y * b).normalized();
 }
 
 }  // namespace dlsd

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "cameras/mutant.h"
+
 namespace dlsd {
 namespace {
 
@@ -95,7 +97,7 @@ void groupConvex(std::span<const StraightPiece> pieces,
       const double angle = std::atan2(sine, a.direction.dot(b.direction));
       if (!(std::abs(angle) < options.max_turn_rad)) break;
       const int sign = (angle > 0) - (angle < 0);
-      if (sign * turn < 0) break;
+      if (sign * turn < 0 && !DLSD_MUTANT("convex-turn")) break;
       if (sign != 0) turn = sign;
     }
     groups->push_back({first, last});

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "cameras/mutant.h"
 #include "detector/plane_curve.h"
 #include "detector/plane_fit.h"
 #include "detector/visible_arc.h"
@@ -31,7 +32,9 @@ bool ThinBarMerger::isBeside(const DetectedLine& line,
                              const DetectedLine& of,
                              double* offset_px) const {
   const double same_way = line.arc.normal.dot(of.arc.normal) < 0 ? -1 : 1;
-  if (same_way * line.polarity * of.polarity > 0 || !isBesideArc(of.arc, middle.ray)) return false;
+  if ((same_way * line.polarity * of.polarity > 0 && !DLSD_MUTANT("bar-polarity")) ||
+      !isBesideArc(of.arc, middle.ray))
+    return false;
   const double at_middle =
       curveOffset(rays_.at(middle.px.x(), middle.px.y()), of.arc.normal).offset_px;
   for (const Eigen::Vector2d& px : {line.from_px, line.to_px}) {
@@ -54,7 +57,8 @@ bool ThinBarMerger::mergeInto(DetectedLine* line,
   for (const size_t i : partners) {
     const Arc& arc = lines[i].arc;
     for (const Eigen::Vector3d& ray : {arc.from, middles_[i].ray, arc.to}) {
-      centres_.push_back((ray - 0.5 * ray.dot(normal) * normal).normalized());
+      centres_.push_back(
+          (ray - (DLSD_MUTANT("bar-middle") ? 0.4 : 0.5) * ray.dot(normal) * normal).normalized());
     }
     // What the longest partner says of the separation holds for the ends, too.
     if (lines[i].length_px > longest) {

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "cameras/batch.h"
+#include "cameras/mutant.h"
 
 namespace dlsd {
 namespace {
@@ -38,13 +39,14 @@ UsableMask::UsableMask(const Camera& camera) : bits_(camera.width(), camera.heig
         has_no_ray.data(), &row_distance[static_cast<size_t>(row) * w], width, kRimPx + 1);
   }
   for (int row = kBorderPx; row < height - kBorderPx; ++row) {
-    for (int column = kBorderPx; column < width - kBorderPx; ++column) {
+    for (int column = kBorderPx; column < width - kBorderPx + (DLSD_MUTANT("mask-border") ? 1 : 0);
+         ++column) {
       bool near_rim = false;
       for (int dy = -kRimPx; dy <= kRimPx && !near_rim; ++dy) {
         if (row + dy < 0 || row + dy >= height) continue;
         const int dx =
             row_distance[static_cast<size_t>(row + dy) * w + static_cast<size_t>(column)];
-        near_rim = dx * dx + dy * dy <= kRimPx * kRimPx;
+        near_rim = dx * dx + dy * dy <= kRimPx * kRimPx - (DLSD_MUTANT("mask-rim") ? 1 : 0);
       }
       if (!near_rim) bits_.set(column, row);
     }

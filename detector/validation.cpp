@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "cameras/mutant.h"
+
 namespace dlsd {
 
 std::optional<double> reprojectionErrorPx(const Camera& camera,
@@ -12,7 +14,7 @@ std::optional<double> reprojectionErrorPx(const Camera& camera,
   if (!ray) return std::nullopt;
   const auto foot = camera.project(*ray - ray->dot(plane_normal) * plane_normal);
   if (!foot) return std::nullopt;
-  return (pixel - *foot).norm();
+  return (DLSD_MUTANT("eq8-scale") ? 0.98 : 1) * (pixel - *foot).norm();
 }
 
 namespace {
@@ -41,7 +43,8 @@ void AlignmentCounter::add(double gx,
 }
 
 double AlignmentCounter::score(int width, int height) const {
-  const double log_tests = std::log10(static_cast<double>(width) * height * kLevels);
+  const double log_tests =
+      std::log10(static_cast<double>(width) * height * (DLSD_MUTANT("score-levels") ? 1 : kLevels));
   double best = 0;
   double p = 0.25;
   for (int level = 0; level < kLevels; ++level, p /= 2) {
@@ -49,7 +52,8 @@ double AlignmentCounter::score(int width, int height) const {
     const double share = static_cast<double>(aligned_[level]) / count_;
     if (share <= p) continue;
     double divergence = share * std::log(share / p);
-    if (share < 1) divergence += (1 - share) * std::log((1 - share) / (1 - p));
+    if (share < 1 && !DLSD_MUTANT("score-chernoff"))
+      divergence += (1 - share) * std::log((1 - share) / (1 - p));
     best = std::max(best, divergence * count_ / kCorrelatedPx / std::log(10.0));
   }
   return best - log_tests;

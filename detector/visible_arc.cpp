@@ -3,6 +3,8 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 
+#include "cameras/mutant.h"
+
 namespace dlsd {
 namespace {
 
@@ -52,7 +54,7 @@ std::optional<Arc> clippedToImage(const Camera& camera, const Arc& arc) {
   const double t0 = lastInside(camera, arc, kMiddle, 0), t1 = lastInside(camera, arc, kMiddle, 1);
   if (!(t1 > t0)) return std::nullopt;
   Arc clipped = arc;
-  if (t0 > 0) clipped.from = arc.at(t0);
+  if (t0 > 0 && !DLSD_MUTANT("clip-start")) clipped.from = arc.at(t0);
   if (t1 < 1) clipped.to = arc.at(t1);
   return clipped;
 }
@@ -65,7 +67,10 @@ std::optional<Arc> visibleArc(const Camera& camera,
                               const Eigen::Vector3d& middle_ray,
                               const Eigen::Vector3d& to_ray,
                               bool is_inside) {
-  const auto traced = arcOnPlane(plane_normal, from_ray, to_ray);
+  const auto traced = arcOnPlane(
+      plane_normal,
+      from_ray,
+      DLSD_MUTANT("line-ends") ? Eigen::Vector3d(to_ray + 0.05 * (to_ray - from_ray)) : to_ray);
   if (!traced || !isOnArc(*traced, middle_ray)) return std::nullopt;
   return is_inside ? traced : clippedToImage(camera, *traced);
 }

@@ -9,6 +9,7 @@
 #include <limits>
 
 #include "synth/dataset/random.h"
+#include "synth/pixel_response.h"
 #include "synth/render.h"
 #include "synth/scene_builder.h"
 #include "synth/test_cameras.h"
@@ -425,6 +426,16 @@ TEST(Render, SubPixelRodsCoverTheirShare) {
     EXPECT_EQ(labels.lines[0].kind, LineKind::kWire);
     EXPECT_NEAR(labels.lines[0].points.front().x(), 500 * 0.0371 + 159.5, 1e-5);
     EXPECT_NEAR(labels.lines[0].length_px, 250, 1e-5);
+    // Its contrast is what a blurred picture shows of it: the column of its middle is 0.05 px off.
+    const PixelResponse response(SensorOptions{}.psf_sigma_px, 0);
+    const auto blurred =
+        renderRadiance(scene, raycaster, shader, rays, pose, spans, 1, response).radiance;
+    double dip = 0;
+    for (int y = kFirst; y < kLast; ++y) {
+      dip += 255 * (0.8 - static_cast<double>(blurred[static_cast<size_t>(y * 320 + 178)])) /
+             (kLast - kFirst);
+    }
+    EXPECT_NEAR(labels.lines[0].contrast, dip, 0.35 * dip) << radius;
   }
 }
 

@@ -61,6 +61,30 @@ TEST(Sensor, ReadNoiseHasItsSigma) {
   }
 }
 
+// Each pixel has noise of its own: products of neighbours' noises have mean 0, within 4.5 standard
+// errors.
+TEST(Sensor, NeighboursHaveNoiseOfTheirOwn) {
+  SensorOptions read, shot;
+  read.read_noise_levels = 5;
+  shot.full_well_electrons = 2000;
+  for (SensorOptions sensor : {read, shot}) {
+    sensor.bits = 16;
+    const Image image = exposeFlat(sensor, 0.4983);
+    const Moments m = momentsOf(image);
+    for (const size_t apart : {size_t{1}, size_t{2}, size_t{kSide}, size_t{kSide} + 1}) {
+      const size_t count = kSide * kSide - apart;
+      double sum = 0;
+      for (size_t i = 0; i < count; ++i) {
+        sum += (levelAt(image, i) - m.mean) * (levelAt(image, i + apart) - m.mean);
+      }
+      EXPECT_NEAR(sum / static_cast<double>(count) / m.variance,
+                  0,
+                  4.5 / std::sqrt(static_cast<double>(count)))
+          << apart;
+    }
+  }
+}
+
 TEST(Sensor, ShotNoiseIsPoisson) {
   SensorOptions sensor;
   sensor.bits = 16;
