@@ -2,7 +2,7 @@
 //
 // Cases are a function of (RC_PARAMS seed, model, number); without a seed one is drawn, and
 // printed, so that a run can be repeated. RC_PARAMS max_success sets how many frames there are (one
-// per 20).
+// per 30 to 60, of each model).
 
 #include <gtest/gtest.h>
 #include <rapidcheck.h>
@@ -63,7 +63,7 @@ struct Frames {
   std::vector<std::string> scenes;
   double noise_levels = 0;
   bool distractors = false;
-  double frames_per_case = 0.05;
+  double frames_per_case = 0.03;
 };
 
 /// Calls judge(case, frame) for frames of these scenes through random cameras of every model, and
@@ -71,7 +71,7 @@ struct Frames {
 void forFrames(const Frames& frames, const auto& judge, const auto& summary) {
   const uint64_t seed = rcParam("seed").value_or(std::random_device{}());
   const auto count = static_cast<uint64_t>(std::max(
-      5.0, static_cast<double>(rcParam("max_success").value_or(100)) * frames.frames_per_case));
+      3.0, static_cast<double>(rcParam("max_success").value_or(100)) * frames.frames_per_case));
   std::cout << "seed " << seed << ", " << count << " frames of each model\n";
   for (const std::string_view model : cameraModelNames()) {
     for (uint64_t i = 0; i < count; ++i) {
@@ -160,7 +160,7 @@ TEST(DetectorSuite, ClearLabelsOfSolidsAndSheetsAreFoundInNoise) {
 // Fewer labels are clear: every label that something stands in front of has the edge of that thing
 // at its end.
 TEST(DetectorSuite, ClearLabelsOfRoomsAreFound) {
-  expectClearLabelsFound({"recovery", {"room"}}, {0.03, 0.98});
+  expectClearLabelsFound({"recovery", {"room"}, 0, false, 0.02}, {0.03, 0.98});
 }
 
 // --- Soundness ---
@@ -194,11 +194,11 @@ void expectSound(const Frames& frames, double most_wrong, double most_astray) {
 }
 
 TEST(DetectorSuite, DetectionsAreLabelledLines) {
-  expectSound({"soundness", scenePresets(), 0, false, 0.04}, 0.01, 0.03);
+  expectSound({"soundness", scenePresets(), 0, false, 0.035}, 0.01, 0.03);
 }
 
 TEST(DetectorSuite, DetectionsAreLabelledLinesBesideRoundThings) {
-  expectSound({"soundness", {"polyhedra", "paper", "wires"}, 2, true, 0.03}, 0.10, 0.06);
+  expectSound({"soundness", {"polyhedra", "paper", "wires"}, 2, true, 0.015}, 0.10, 0.06);
 }
 
 // --- Cases ---
