@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 
+#include "detector/grey_rows.h"
 #include "detector/test_scene.h"
 
 namespace dlsd {
@@ -152,6 +153,22 @@ TEST(Gradient, BgrWeighsBlueLess) {
   const GradientField blue = gradientOf(view);
   const size_t edge = red.at(30, 20);
   EXPECT_NEAR(static_cast<double>(red.gx[edge]) / blue.gx[edge], 77.0 / 29, 0.05);
+}
+
+TEST(Gradient, SixteenBitsAreRoundedToTheNearest) {
+  std::vector<uint16_t> values(65536), row(65536);
+  for (size_t i = 0; i < values.size(); ++i) values[i] = static_cast<uint16_t>(i);
+  loadGreyRow({.data = values.data(),
+               .width = 65536,
+               .height = 1,
+               .stride_bytes = 2 * 65536,
+               .type = PixelType::kU16},
+              0,
+              row.data());
+  for (size_t i = 0; i < values.size(); ++i) {
+    const double exact = static_cast<double>(i) * 255 * kGreyUnit / 65535;
+    ASSERT_LE(std::abs(static_cast<double>(row[i]) - exact), 0.5) << i;
+  }
 }
 
 TEST(Gradient, FloatsOutsideTheRangeAreClamped) {

@@ -67,6 +67,30 @@ TEST(PlanarChain, SplitsWhereThePlaneChanges) {
   EXPECT_TRUE(pieces.empty());
 }
 
+// A chain that bows out by less than max_err_px is one piece, by more it is two.
+TEST(PlanarChain, SplitsWhereAnEdgeIsTooFarFromThePlane) {
+  const Camera camera = test::testCameras()[0].camera;
+  const RayTable rays(camera);
+  const auto pieces = [&](double bow_px) {
+    // One coordinate for eight rows, so that the nodes' means say fractions of a pixel.
+    CrestChains chains;
+    constexpr int kRows = 240;
+    double rest = 0;
+    for (int i = 0; i < kRows; ++i) {
+      const double exact = 200 + bow_px * (1 - std::abs(2.0 * i / kRows - 1)) + rest;
+      chains.across.push_back(static_cast<uint16_t>(std::lround(exact)));
+      rest = exact - static_cast<double>(chains.across.back());
+    }
+    chains.chains.push_back({0, kRows, 100, true});
+    PlanarSplitter splitter(rays, {.max_err_px = 2});
+    std::vector<PlanarPiece> out;
+    splitter.split(chains, &out);
+    return out.size();
+  };
+  EXPECT_EQ(pieces(1.4), 1U);
+  EXPECT_EQ(pieces(2.8), 2U);
+}
+
 TEST(PlanarChain, ShortPiecesAreDropped) {
   const Camera camera = test::testCameras()[0].camera;
   const RayTable rays(camera);

@@ -100,7 +100,9 @@ void PlaneDetector::traceAll(std::vector<DetectedLine>* lines) {
     const PlanarPiece& piece = pieces_[index];
     if (isClaimed(piece) && !DLSD_MUTANT("lines-twice")) continue;
     const auto traced = tracer_.trace(piece, splitter_.nodes());
-    if (!traced || (traced->is_arc && !DLSD_MUTANT("arcs-are-lines")) || mostlyClaimed()) continue;
+    if (!traced || (traced->is_arc && !DLSD_MUTANT("arcs-are-lines")) ||
+        (mostlyClaimed() && !DLSD_MUTANT("lines-twice")))
+      continue;
     const double off_rad = DLSD_MUTANT("line-offset") ? 2e-4 : 0;
     const auto arc = visibleArc(rays_.camera(),
                                 (traced->fit.normal + off_rad * traced->middle_ray).normalized(),
@@ -117,7 +119,7 @@ void PlaneDetector::traceAll(std::vector<DetectedLine>* lines) {
     line.length_px = traced->length_px;
     line.score = traced->score;
     line.polarity = DLSD_MUTANT("polarity") ? 1 : traced->polarity;
-    line.normal_cov = traced->fit.inverse_in_plane * (DLSD_MUTANT("line-covariance") ? 4 : 1) *
+    line.normal_cov = traced->fit.inverse_in_plane * (DLSD_MUTANT("line-covariance") ? 0.25 : 1) *
                       traced->variance_factor;
   }
 }

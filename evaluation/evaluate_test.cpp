@@ -277,7 +277,9 @@ TEST_F(Evaluate, AnglesAndNormalsOfAKnownShift) {
   // Towards the sides the ray is longer: 0.5 / f cos(field angle) on the average.
   EXPECT_LE(errors.sum_rad / double(errors.angle_samples), 0.5 / 400);
   EXPECT_GE(errors.sum_rad / double(errors.angle_samples), 0.9 * 0.5 / 400);
-  EXPECT_GE(errors.sum2_rad2 * double(errors.angle_samples), errors.sum_rad * errors.sum_rad);
+  const double squared_mean = errors.sum_rad * errors.sum_rad / double(errors.angle_samples);
+  EXPECT_GE(errors.sum2_rad2, squared_mean);
+  EXPECT_LE(errors.sum2_rad2, 1.1 * squared_mean);
   EXPECT_FALSE(errors.normal_sigmas);  // nothing is known of the noise
   // A detection's own normal is taken at its word, whatever its sign.
   DetectionLine with_normal = shifted(middle, {0, 0.5});

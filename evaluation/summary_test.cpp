@@ -70,6 +70,19 @@ TEST(Summary, PoolsCountsPerCameraAndOverAll) {
   EXPECT_EQ(summary.all.localisation[kFaint].count, 0);
 }
 
+// A label found by three detections counts three fragments.
+TEST(Summary, FragmentsAreCountedEach) {
+  const Camera camera = pinholeCamera();
+  const LabelLine line = label(camera, {100, 200}, {300, 200}, 0);
+  Summary summary{EvaluationOptions{}};
+  summary.add(frame("three",
+                    camera,
+                    {line},
+                    {shifted(line, {0, 0.1}), shifted(line, {0, 0.2}), shifted(line, {0, 0.3})}),
+              camera);
+  EXPECT_EQ(summary.all.at_rho[0].fragments[kHeadline], (Ratio{3, 1}));
+}
+
 TEST(Summary, TableShowsCountedAndTotal) {
   const std::string text = table(exampleSummary());
   EXPECT_THAT(text, testing::HasSubstr("1/2  50.0 %"));
