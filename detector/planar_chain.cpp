@@ -8,6 +8,39 @@
 
 namespace dlsd {
 
+std::optional<PlanarPiece> PlanarSplitter::pieceOf(uint32_t first,
+                                                   uint32_t last,
+                                                   float px_per_node) const {
+  const int length_px = static_cast<int>(static_cast<float>(last - first + 1) * px_per_node + 0.5F);
+  if (last == first || length_px < options_.seed_px) return std::nullopt;
+  const Eigen::Vector3d normal =
+      node_rays_[first].ray.cast<double>().cross(node_rays_[last].ray.cast<double>());
+  const double norm = normal.norm();
+  if (!(norm > 0)) return std::nullopt;
+  PlanarPiece piece{normal / norm,
+                    nodes_[(first + last) / 2].cast<double>(),
+                    length_px,
+                    first,
+                    last - first + 1,
+                    0,
+                    first};
+  const Eigen::Vector3f rounded = piece.normal.cast<float>();
+  for (uint32_t i = first + 1; i < last; ++i) {
+    const float err_px = std::abs(node_rays_[i].ray.dot(rounded)) * node_rays_[i].px_per_rad;
+    if (err_px > piece.farthest_px) {
+      piece.farthest_px = err_px;
+      piece.farthest_node = i;
+    }
+  }
+  return piece;
+}
+
+std::optional<PlanarPiece> PlanarSplitter::part(const PlanarPiece& of,
+                                                uint32_t first,
+                                                uint32_t last) const {
+  return pieceOf(first, last, static_cast<float>(of.length_px) / static_cast<float>(of.nodes));
+}
+
 /// Nodes first ... last.
 void PlanarSplitter::splitInterval(uint32_t first,
                                    uint32_t last,
@@ -18,30 +51,16 @@ void PlanarSplitter::splitInterval(uint32_t first,
   while (!stack_.empty()) {
     const auto [a, b] = stack_.back();
     stack_.pop_back();
-    const int length_px = static_cast<int>(static_cast<float>(b - a + 1) * px_per_node + 0.5F);
-    if (b == a || length_px < options_.seed_px) continue;
-    const Eigen::Vector3f normal = node_rays_[a].ray.cross(node_rays_[b].ray).normalized();
-    float farthest_px = 0;
-    uint32_t at = a;
-    for (uint32_t i = a + 1; i < b; ++i) {
-      const float err_px = std::abs(node_rays_[i].ray.dot(normal)) * node_rays_[i].px_per_rad;
-      if (err_px > farthest_px) {
-        farthest_px = err_px;
-        at = i;
-      }
-    }
-    if (static_cast<double>(farthest_px) >
+    const auto piece = pieceOf(a, b, px_per_node);
+    if (!piece) continue;
+    if (static_cast<double>(piece->farthest_px) >
         (DLSD_MUTANT("split-error") ? 2 : 1) * options_.max_err_px) {
       // The later half first onto the stack: pieces come out in the order of the chain.
-      stack_.emplace_back(at, b);
-      stack_.emplace_back(a, at);
+      stack_.emplace_back(piece->farthest_node, b);
+      stack_.emplace_back(a, piece->farthest_node);
       continue;
     }
-    const Eigen::Vector3d exact =
-        node_rays_[a].ray.cast<double>().cross(node_rays_[b].ray.cast<double>());
-    const double norm = exact.norm();
-    if (!(norm > 0)) continue;
-    pieces->push_back({exact / norm, nodes_[(a + b) / 2].cast<double>(), length_px, a, b - a + 1});
+    pieces->push_back(*piece);
   }
 }
 

@@ -3,6 +3,7 @@
 // whatever the lens makes of them. The generalisation of the straight pieces of 4.2.
 
 #include <Eigen/Core>
+#include <optional>
 #include <vector>
 
 #include "cameras/ray_table.h"
@@ -17,6 +18,8 @@ struct PlanarPiece {
   Eigen::Vector2d start_px;    ///< On the chain, about the middle of the piece.
   int length_px;               ///< Rows (columns) that it crosses.
   uint32_t first_node, nodes;  ///< Its points among PlanarSplitter::nodes().
+  float farthest_px;           ///< Of its points from the plane ...
+  uint32_t farthest_node;      ///< ... and which one that is.
 };
 
 class PlanarSplitter {
@@ -27,6 +30,12 @@ class PlanarSplitter {
   /// Points of about kNodePx crests each are joined by planes; where a chain strays from the plane
   /// through its ends by more than max_err_px, it is split at the farthest point, again and again.
   void split(const CrestChains& chains, std::vector<PlanarPiece>* pieces);
+
+  /// A part of a piece: the nodes first ... last, joined by a plane of their own. No value if they
+  /// are fewer than two, shorter than seed_px or have no plane.
+  [[nodiscard]] std::optional<PlanarPiece> part(const PlanarPiece& of,
+                                                uint32_t first,
+                                                uint32_t last) const;
 
   /// Means of about kNodePx consecutive crests, chain by chain.
   [[nodiscard]] const std::vector<Eigen::Vector2f>& nodes() const { return nodes_; }
@@ -42,6 +51,9 @@ class PlanarSplitter {
                      uint32_t last,
                      float px_per_node,
                      std::vector<PlanarPiece>* pieces);
+  [[nodiscard]] std::optional<PlanarPiece> pieceOf(uint32_t first,
+                                                   uint32_t last,
+                                                   float px_per_node) const;
 
   const RayTable& rays_;
   PlanarChainOptions options_;

@@ -89,39 +89,79 @@ void PlaneDetector::claim() {
 }
 
 void PlaneDetector::traceAll(std::vector<DetectedLine>* lines) {
-  order_.resize(pieces_.size());
-  for (size_t i = 0; i < pieces_.size(); ++i) order_[i] = static_cast<uint32_t>(i);
-  std::sort(order_.begin(), order_.end(), [&](uint32_t a, uint32_t b) {
-    const int length_a = pieces_[a].length_px, length_b = pieces_[b].length_px;
-    return length_a != length_b ? length_a > length_b : a < b;
-  });
   std::fill(claimed_.words.begin(), claimed_.words.end(), uint64_t{0});
-  for (const uint32_t index : order_) {
-    const PlanarPiece& piece = pieces_[index];
-    if (isClaimed(piece) && !DLSD_MUTANT("lines-twice")) continue;
-    const auto traced = tracer_.trace(piece, splitter_.nodes());
-    if (!traced || (traced->is_arc && !DLSD_MUTANT("arcs-are-lines")) ||
-        (mostlyClaimed() && !DLSD_MUTANT("lines-twice")))
-      continue;
-    const double off_rad = DLSD_MUTANT("line-offset") ? 2e-4 : 0;
-    const auto arc = visibleArc(rays_.camera(),
-                                (traced->fit.normal + off_rad * traced->middle_ray).normalized(),
-                                traced->from_ray,
-                                traced->middle_ray,
-                                traced->to_ray,
-                                traced->is_inside);
-    if (!arc) continue;
-    claim();
-    DetectedLine& line = lines->emplace_back();
-    line.arc = *arc;
-    line.rms_px = traced->rms_px;
-    line.max_px = traced->max_px;
-    line.length_px = traced->length_px;
-    line.score = traced->score;
-    line.polarity = DLSD_MUTANT("polarity") ? 1 : traced->polarity;
-    line.normal_cov = traced->fit.inverse_in_plane * (DLSD_MUTANT("line-covariance") ? 0.25 : 1) *
-                      traced->variance_factor;
+  while (!pieces_.empty()) {
+    order_.resize(pieces_.size());
+    for (size_t i = 0; i < pieces_.size(); ++i) order_[i] = static_cast<uint32_t>(i);
+    std::sort(order_.begin(), order_.end(), [&](uint32_t a, uint32_t b) {
+      const int length_a = pieces_[a].length_px, length_b = pieces_[b].length_px;
+      return length_a != length_b ? length_a > length_b : a < b;
+    });
+    rest_.clear();
+    for (const uint32_t index : order_) {
+      const PlanarPiece& piece = pieces_[index];
+      if (isClaimed(piece) && !DLSD_MUTANT("lines-twice")) continue;
+      trace(piece, lines);
+      keepRest(piece);
+    }
+    pieces_.swap(rest_);
   }
+}
+
+/// What a trace leaves of a piece is looked at again by itself: the calibration is never exact, and
+/// a piece may bend by more than an edge may be off.
+void PlaneDetector::keepRest(const PlanarPiece& piece) {
+  constexpr float kBentPx = 0.3F;
+  constexpr uint32_t kMinNodes = 3;
+  const uint32_t end = piece.first_node + piece.nodes;
+  const auto isFree = [&](uint32_t node) {
+    const Eigen::Vector2f& p = splitter_.nodes()[node];
+    return !claimed_.contains(static_cast<int>(p.x() + 0.5F), static_cast<int>(p.y() + 0.5F));
+  };
+  for (uint32_t first = piece.first_node; first < end; ++first) {
+    if (!isFree(first)) continue;
+    uint32_t last = first;
+    while (last + 1 < end && isFree(last + 1)) ++last;
+    if (last - first + 1 == piece.nodes) {
+      if (piece.farthest_px < kBentPx) return;
+      for (const auto& [a, b] :
+           {std::pair(first, piece.farthest_node), std::pair(piece.farthest_node, last)}) {
+        if (b - a + 1 < kMinNodes) continue;
+        if (const auto part = splitter_.part(piece, a, b)) rest_.push_back(*part);
+      }
+      return;
+    }
+    if (last - first + 1 >= kMinNodes) {
+      if (const auto part = splitter_.part(piece, first, last)) rest_.push_back(*part);
+    }
+    first = last;
+  }
+}
+
+void PlaneDetector::trace(const PlanarPiece& piece, std::vector<DetectedLine>* lines) {
+  const auto traced = tracer_.trace(piece, splitter_.nodes());
+  if (!traced || (traced->is_arc && !DLSD_MUTANT("arcs-are-lines")) ||
+      (mostlyClaimed() && !DLSD_MUTANT("lines-twice"))) {
+    return;
+  }
+  const double off_rad = DLSD_MUTANT("line-offset") ? 2e-4 : 0;
+  const auto arc = visibleArc(rays_.camera(),
+                              (traced->fit.normal + off_rad * traced->middle_ray).normalized(),
+                              traced->from_ray,
+                              traced->middle_ray,
+                              traced->to_ray,
+                              traced->is_inside);
+  if (!arc) return;
+  claim();
+  DetectedLine& line = lines->emplace_back();
+  line.arc = *arc;
+  line.rms_px = traced->rms_px;
+  line.max_px = traced->max_px;
+  line.length_px = traced->length_px;
+  line.score = traced->score;
+  line.polarity = DLSD_MUTANT("polarity") ? 1 : traced->polarity;
+  line.normal_cov = traced->fit.inverse_in_plane * (DLSD_MUTANT("line-covariance") ? 0.25 : 1) *
+                    traced->variance_factor;
 }
 
 void PlaneDetector::detect(const ImageView& image,

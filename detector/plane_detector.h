@@ -30,6 +30,8 @@ class PlaneDetector {
  private:
   void loadPixels(const ImageView& image);
   void traceAll(std::vector<DetectedLine>* lines);
+  void trace(const PlanarPiece& piece, std::vector<DetectedLine>* lines);
+  void keepRest(const PlanarPiece& piece);
   [[nodiscard]] bool isClaimed(const PlanarPiece& piece) const;
   [[nodiscard]] bool mostlyClaimed() const;
   void claim();
@@ -45,7 +47,7 @@ class PlaneDetector {
   std::vector<uint16_t> fixed_;  // pixels of other types than 8-bit grey
   EdgeMap map_;
   CrestChains chains_;
-  std::vector<PlanarPiece> pieces_;
+  std::vector<PlanarPiece> pieces_, rest_;
   std::vector<uint32_t> order_;
   BitRows claimed_;
 };
