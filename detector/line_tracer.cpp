@@ -24,6 +24,8 @@ constexpr float kModelVariance = 0.03F * 0.03F;
 /// Wide over narrow response: 1 for a step, 1.2 for one of blur 1.5 px, 1.3 for two alike that are
 /// 3 px apart, 1.7 for shading that rises evenly.
 constexpr float kMaxWideRatio = 1.45F;
+/// How fast the bound of the residuals follows them, from four rows to the next.
+constexpr float kDriftRate = 0.3F;
 /// Standard deviations of noise that the response of an edge exceeds.
 constexpr float kEdgeSigmas = 2.5F;
 
@@ -217,13 +219,21 @@ void LineTracer::judge(Quad* quad) const {
   // mean.
   constexpr float kTurnScatter = 0.894F;
   const float turn = std::abs(quad->turn) * quad->perpendicular * quad->perpendicular;
+  const float distance = gain * even * sideOf(*quad);  // times odd
+  quad->drift_px = drift_px_;
   quad->is_edge = std::abs(odd) >= (wide_ ? min_odd_wide_ : min_odd_narrow_) &&
-                  std::abs(even) * gain * quad->perpendicular <= bound_px_ * std::abs(odd) &&
+                  std::abs(distance - drift_px_ * odd) <= bound_px_ * std::abs(odd) &&
+                  std::abs(distance) <= widest_px_ * std::abs(odd) &&
                   turn <= kMaxTangent * std::abs(odd) + 2 * kTurnScatter * noise &&
                   std::abs(quad->mean.odd_wide) <=
                       kMaxWideRatio * std::abs(quad->mean.odd_narrow) + 2 * noise_.odd_wide;
   quad->offset_px = quad->is_edge ? gain * even / odd : 0;
   quad->variance_px2 = quad->is_edge ? noise * noise / (odd * odd) + kModelVariance : 0;
+}
+
+/// Distance towards the normal per px across.
+float LineTracer::sideOf(const Quad& quad) const {
+  return quad.across.dot(normal_) < 0 ? -quad.perpendicular : quad.perpendicular;
 }
 
 void LineTracer::add(const Quad& quad) {
@@ -245,6 +255,7 @@ bool LineTracer::refit() {
 
 void LineTracer::extend(int direction, Front* front) {
   int misses = 0;
+  drift_px_ = 0;
   std::array<Quad, 2> next;
   Eigen::Vector3d last_ray = quads_.empty() ? Eigen::Vector3d::Zero() : quads_.back().ray;
   while (!front->ended) {
@@ -278,6 +289,7 @@ void LineTracer::extend(int direction, Front* front) {
       quads_.push_back(q);
       if (q.is_edge) {
         misses = 0;
+        drift_px_ += drift_rate_ * (q.offset_px * sideOf(q) - drift_px_);
         add(q);
       } else if (++misses * kQuadPx > options_.max_gap_px) {
         front->ended = true;
@@ -499,9 +511,11 @@ void LineTracer::refine() {
     q.offset_px = gain.narrow * q.mean.even_narrow / q.mean.odd_narrow;
     const float sigma = sigmaOf(gain.narrow, noise_.even_narrow, q.mean.odd_narrow);
     q.variance_px2 = sigma * sigma + kModelVariance;
-    const float bound =
-        std::max(bound_px_, static_cast<float>(options_.max_residual_sigmas) * sigma);
-    q.is_edge = std::isfinite(sigma) && std::abs(q.offset_px) * q.perpendicular <= bound;
+    const float scatter = static_cast<float>(options_.max_residual_sigmas) * sigma;
+    const float distance = q.offset_px * sideOf(q);
+    q.is_edge = std::isfinite(sigma) &&
+                std::abs(distance - q.drift_px) <= std::max(bound_px_, scatter) &&
+                std::abs(distance) <= std::max(widest_px_, scatter);
     if (!q.is_edge || !alone) continue;
     const float wide_sigma = sigmaOf(gain.wide, noise_.even_wide, q.mean.odd_wide);
     const float variance = std::max(0.0F, sigma * sigma - wide_sigma * wide_sigma) +
@@ -544,7 +558,8 @@ std::optional<TracedLine> LineTracer::trace(const PlanarPiece& piece,
   points_ = points_at_fit_ = 0;
   angle_rad_ = 0;
   wide_ = false;
-  bound_px_ = 1.5F;  // chains are whole pixels
+  bound_px_ = widest_px_ = 1.5F;  // chains are whole pixels
+  drift_px_ = 0;
   offset_gain_ = 1;
 
   // The plane of the piece from a few of its rows: more of them if they scatter.
@@ -602,6 +617,10 @@ std::optional<TracedLine> LineTracer::trace(const PlanarPiece& piece,
       std::clamp(options_.max_residual_sigmas * (wide_ ? wide_sigma_px : narrow_sigma_px),
                  options_.tight_rho_px,
                  options_.rho_px));
+  // Where noise makes the bound, there is no drift to be seen.
+  const bool is_clear = static_cast<double>(bound_px_) <= options_.tight_rho_px;
+  drift_rate_ = is_clear ? kDriftRate : 0;
+  widest_px_ = is_clear ? static_cast<float>(options_.rho_px) : bound_px_;
 
   moments_ = {};
   points_ = points_at_fit_ = 0;

@@ -71,6 +71,7 @@ class LineTracer {
     float turn;                     // change of the even response from row to row
     std::array<float, 4> odd;       // by row, in the order of the walk
     float offset_px, variance_px2;  // of the edge from the curve, across; of its noise
+    float drift_px;                 // what the edges before it were off by
     bool crosses_rows, is_edge;
     int8_t way;  // of the walk along the rows, +1 or -1
   };
@@ -98,6 +99,7 @@ class LineTracer {
   bool orient(Front* front) const;
   bool evaluate(Front* front, int direction, std::array<Quad, 2>* quads) const;
   void judge(Quad* quad) const;
+  [[nodiscard]] float sideOf(const Quad& quad) const;
   void add(const Quad& quad);
   void extend(int direction, Front* front);
   bool refit();
@@ -119,8 +121,11 @@ class LineTracer {
   std::vector<Quad> quads_;
   RayMoments moments_;
   Eigen::Vector3d normal_;
-  bool wide_ = false;  // which filters judge
-  float bound_px_ = 1;
+  bool wide_ = false;   // which filters judge
+  float bound_px_ = 1;  // of the distance of an edge from ...
+  float drift_px_ = 0;  // ... what the edges before it showed (calibrations are off by that) ...
+  float drift_rate_ = 0;
+  float widest_px_ = 1;    // ... and from the curve
   float offset_gain_ = 1;  // of narrow offsets, by this line's sharpness
   int points_ = 0, points_at_fit_ = 0;
   double angle_rad_ = 0;
