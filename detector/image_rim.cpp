@@ -22,6 +22,8 @@ constexpr double kLeastShare = 0.6;
 constexpr double kLargestGapRad = 3.5;
 /// A lens is not far off its own axis.
 constexpr double kLargestOffset = 0.1;
+/// Where the camera model ends just there, its edge is known: UsableMask.
+constexpr double kBeforeModelEnds = 0.96;
 /// How far inside and outside of the circle edges of the rim are found: vignetting.
 constexpr double kInside = 0.06, kOutside = 0.03;
 /// tan of the angle between a line and the rim.
@@ -125,6 +127,7 @@ std::optional<ImageRim> ImageRimFinder::find(const GreyPixels& pixels) {
   const bool is_rim =
       static_cast<double>(near_.size()) >= kLeastShare * static_cast<double>(ends_.size()) &&
       rim.centre.norm() <= kLargestOffset * rim.radius &&
+      rim.radius <= kBeforeModelEnds * camera_.maxFieldAngle() &&
       largestGap(near_, rim.centre) <= kLargestGapRad;
   return is_rim ? std::optional(rim) : std::nullopt;
 }

@@ -71,6 +71,11 @@ TEST(ImageRim, IsNotWhereThereIsNone) {
     const Picture picture(scene, camera);
     EXPECT_FALSE(finder.find(picture.grey)) << &scene - scenes;
   }
+  // Where the model ends, too, the rim is no news.
+  const Camera as_its_lens =
+      Camera(camera.model(), camera.width(), camera.height(), /*max_field_angle_rad=*/1.3);
+  EXPECT_FALSE(
+      ImageRimFinder(as_its_lens).find(Picture(sceneThrough(3.1, 8, 110), as_its_lens).grey));
   const Camera tiny(Pinhole::fromParams({1, 1, 0, 0}), 1, 1);
   const uint8_t dark = 0;
   GreyPixels pixel;
