@@ -23,7 +23,7 @@ constexpr double kLargestGapRad = 3.5;
 /// A lens is not far off its own axis.
 constexpr double kLargestOffset = 0.1;
 /// Where the camera model ends just there, its edge is known: UsableMask.
-constexpr double kBeforeModelEnds = 0.96;
+constexpr double kBeforeModelEnds = 0.9;
 /// How far inside and outside of the circle edges of the rim are found: vignetting.
 constexpr double kInside = 0.06, kOutside = 0.03;
 /// tan of the angle between a line and the rim.
