@@ -10,7 +10,7 @@ source scripts/packages.sh
 need_packages "${build_packages[@]}"
 # Without tests on a first run; a build folder that test.sh has configured stays as it is.
 if [[ ! -f build/release/build.ninja ]]; then configure release DLSD_TESTS=OFF; fi
-echo "Building (first time: a few minutes) ..."
+if [[ ! -x build/release/cli/dlsd ]]; then echo "Building (once; five to ten minutes on two cores) ..."; fi
 build release --target dlsd_cli
 dlsd=build/release/cli/dlsd
 
