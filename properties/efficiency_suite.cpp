@@ -35,8 +35,8 @@ TEST_P(EfficiencySuite, PlanesAreKnownNearlyAsWellAsNoiseAllows) {
   // is for the pieces of sides near the corners that lines leave out.
   // Towards the poles of a panorama lines bend so much that some are found in pieces.
   const bool is_panorama = GetParam() == Equirectangular::kName;
-  const double most_offset = is_panorama ? 3 : 1.7, most_roll = is_panorama ? 3 : 2.2;
-  const double least_found = is_panorama ? 0.9 : 0.95;
+  const double most_offset = is_panorama ? 3 : 2.1, most_roll = is_panorama ? 3 : 2.2;
+  const double least_found = 0.9;
   constexpr double kBiasPx = 0.02, kSideBiasPx = 0.05;
   SideErrors all;
   Worst side_bias("mean offset of a side beyond 4 standard errors, px");

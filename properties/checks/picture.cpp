@@ -478,9 +478,12 @@ PictureOutcome checkChanged(const PictureCase& c, const DetectorOptions& options
       change.forward = [=](const Vector2d& p) { return Vector2d(p.x() + left, p.y() + top); };
       const View of_part(croppedCamera(camera, left, top, pw, ph), std::move(part), options);
       compare(of_part, view, change, with_shown, &outcome);
-      if (is_empty && of_part.lines.size() != view.lines.size() && outcome.failure.empty()) {
-        outcome.failure = fmt::format(
-            "{} lines with the border, {} without it", view.lines.size(), of_part.lines.size());
+      // The grid of rays lies elsewhere, by which rounding differs; where it is nearly undecided
+      // whether an edge is an arc, a line more or less may be found.
+      const size_t with = view.lines.size(), without = of_part.lines.size();
+      if (is_empty && std::max(with, without) > std::min(with, without) + 1 &&
+          outcome.failure.empty()) {
+        outcome.failure = fmt::format("{} lines with the border, {} without it", with, without);
       }
       break;
     }
