@@ -108,8 +108,7 @@ struct Ocam {
     const T r2 = x * x + y * y;
     const T r = axisDistance(r2);
     const T theta = polarAngle(r, z);
-    const auto& rho =
-        newtonSteps([&](T radius) { return mismatch(radius, r, z); }, start.at(theta));
+    const auto& rho = radiusOfKernel(r, z, theta);
     const T scale = rho.x * (T(1) / r);
     const T u = sensorU(x * scale, y * scale), v = sensorV(x * scale, y * scale);
     const bool beyond = theta > T(max_theta) * (T(1) + T(8) * std::numeric_limits<T>::epsilon());
@@ -152,7 +151,8 @@ struct Ocam {
     const W across = std::sqrt(W(x) * W(x) + W(y) * W(y));
     const double r = static_cast<double>(across);  // 0 where project takes its limit, too.
     const auto [solved, found] = sensorRadius<double>(across, z);
-    const double rho = found ? solved : std::numeric_limits<double>::quiet_NaN();
+    // Within rounding of the domain's end only the kernel may have an answer, which is project's.
+    const double rho = found ? solved : radiusOfKernel(r, z, polarAngle(r, z)).x;
     const double value = forward(rho).value;
     // value - rho slope; its terms without a1, which cancels.
     double turning = 0;
@@ -186,6 +186,12 @@ struct Ocam {
   [[nodiscard, gnu::always_inline]] Jet<T> mismatch(T rho, T across, T along) const {
     const auto [value, slope, curvature] = forward(rho);
     return {rho * along - value * across, along - slope * across, -curvature * across};
+  }
+
+  /// rho by two steps from the fitted start.
+  template <class T>
+  [[nodiscard, gnu::always_inline]] Arrival<T> radiusOfKernel(T across, T along, T theta) const {
+    return newtonSteps([&](T rho) { return mismatch(rho, across, along); }, start.at(theta));
   }
 
   template <class T>

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/LU>
+
 namespace dlsd {
 namespace {
 
@@ -68,6 +70,33 @@ TEST(Ocam, TheJacobianIsThatOfTheAnswerUpToTheFold) {
     }
   }
   EXPECT_GE(answers, 2000);
+  // The angle of this ray is, to rounding, that of the fold: the solve has no answer.
+  const Ocam at_fold = Ocam::fromParams({-1997.6105866011678,
+                                         -0.0099999999989873398,
+                                         2.7012043665725778e-05,
+                                         -5.0119685110113029e-08,
+                                         -7.5130124381050611e-13,
+                                         -1.2289805383626913e-16,
+                                         -1.1246556500456632e-19,
+                                         -2.5179957534153688e-23,
+                                         -5.6371443433445157e-27,
+                                         53.050000000000004,
+                                         1792.75,
+                                         0.9,
+                                         -0.01,
+                                         -0.01});
+  const Eigen::Vector3d ray(0.65141695514958264, 0.1794586966995704, 0.7371909703208106);
+  const auto pixel = at_fold.project(ray.x(), ray.y(), ray.z());
+  ASSERT_TRUE(pixel.valid);
+  const Eigen::Matrix<double, 2, 3> J = at_fold.jacobian(ray.x(), ray.y(), ray.z());
+  ASSERT_TRUE(J.allFinite());
+  const Eigen::Vector2d turned = J * Eigen::Vector3d(-ray.y(), ray.x(), 0);
+  const double u = pixel.u - at_fold.cx, v = pixel.v - at_fold.cy;
+  Eigen::Matrix2d affine;  // of (u, v) from the ideal plane
+  affine << 1, at_fold.e, at_fold.d, at_fold.c;
+  const Eigen::Vector2d ideal = affine.inverse() * Eigen::Vector2d(u, v);
+  const Eigen::Vector2d expected = affine * Eigen::Vector2d(-ideal.y(), ideal.x());
+  EXPECT_LE((turned - expected).norm(), 1e-6 * expected.norm());
 }
 
 TEST(Ocam, SparseCoefficientsAreInvertedToTheLastBits) {
