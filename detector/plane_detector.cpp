@@ -28,7 +28,6 @@ PlaneDetector::PlaneDetector(const RayTable& rays, const DetectorOptions& option
       linker_(rays.camera().width(), options.edges),
       splitter_(rays, options.planes),
       tracer_(rays, options.validation),
-      rim_finder_(rays.camera()),
       claimed_(rays.camera().width(), rays.camera().height()) {}
 
 void PlaneDetector::loadPixels(const ImageView& image) {
@@ -186,9 +185,6 @@ void PlaneDetector::detect(const ImageView& image,
   const StopWatch stage(&times->validation);
   tracer_.setImage(pixels_, usable, seen, options_.edges.min_gradient / kGradientPerContrast);
   traceAll(lines);
-  if (const auto rim = rim_finder_.find(pixels_)) {
-    std::erase_if(*lines, [&](const DetectedLine& line) { return isOnRim(line.arc, *rim); });
-  }
 }
 
 }  // namespace dlsd

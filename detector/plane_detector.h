@@ -8,7 +8,6 @@
 #include "detector/detector.h"
 #include "detector/edge_linking.h"
 #include "detector/edge_map.h"
-#include "detector/image_rim.h"
 #include "detector/line_tracer.h"
 #include "detector/options.h"
 #include "detector/planar_chain.h"
@@ -43,7 +42,6 @@ class PlaneDetector {
   EdgeLinker linker_;
   PlanarSplitter splitter_;
   LineTracer tracer_;
-  ImageRimFinder rim_finder_;
 
   GreyPixels pixels_;
   std::vector<uint16_t> fixed_;  // pixels of other types than 8-bit grey
