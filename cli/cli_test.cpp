@@ -54,7 +54,9 @@ TEST_F(Cli, UsageErrorsAreTwo) {
   expectRefused("report --data data --out o --jobs 1025", 2, "1025");
   expectRefused("paint", 2, "paint");
   expectRefused("generate --out data", 2, "--camera");
-  expectRefused("generate --camera wide.yaml --out data --colour red", 2, "--colour");
+  expectRefused("generate --camera wide.yaml --out data --colour red", 2, "--colour\n");
+  expectRefused("generate --camera wide.yaml --oout data", 2, "--oout, did you mean --out?");
+  expectRefused("detect --camera wide.yaml --fromat=x a.png", 2, ", did you mean --format?");
   expectRefused("generate --camera wide.yaml --out data --count many", 2, "many");
   expectRefused("generate --camera wide.yaml --out data --count 0", 2, "count");
   expectRefused("generate --camera wide.yaml --out data --count 99999999999999999999", 2, "count");

@@ -99,6 +99,10 @@ int verify(const std::string& folder) {
   });
   progress.reset();
   for (const std::string& problem : check.problems) print(problem + "\n");
+  if (check.unfinished && check.named == 0) {
+    complain(folder + ": not finished yet, the dlsd generate that began it goes on from there");
+    return kCheckFailed;
+  }
   print(fmt::format("{}: {} of {} frames are whole\n", folder, check.whole, check.named));
   if (check.problems.empty()) return kDone;
   complain(fmt::format("{}: {} wrong, the dlsd generate that made it makes it whole again",

@@ -228,6 +228,15 @@ TEST_F(GenerateCli, InterruptedItSaysSoAndGoesOn) {
     const std::string journal = contentOf(folder / out / "journal.txt");
     EXPECT_EQ(std::count(journal.begin(), journal.end(), '\n'), long(images) + 1);
     EXPECT_GE(images, 1U);
+    const Result verified = dlsd("generate --verify " + out);
+    EXPECT_EQ(verified.code, 1);
+    EXPECT_EQ(verified.out,
+              out +
+                  "/manifest.json: missing, the run is not finished (journal.txt): the same dlsd "
+                  "generate goes on\n");
+    EXPECT_EQ(verified.err,
+              "dlsd: " + out +
+                  ": not finished yet, the dlsd generate that began it goes on from there\n");
   }
 }
 

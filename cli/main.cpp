@@ -98,6 +98,25 @@ void checkCommands(const CLI::App& app, int argc, char** argv) {
   }
 }
 
+/// ", did you mean --out?" for the first option that the command does not have, if one of its own
+/// is like it.
+std::string meantOption(const CLI::App& app) {
+  const CLI::App* command = &app;
+  while (!command->get_subcommands().empty()) command = command->get_subcommands().front();
+  for (const std::string& word : app.remaining(true)) {
+    if (!word.starts_with("--")) continue;
+    const std::string name = word.substr(2, word.find('=') - 2);
+    for (const CLI::Option* option : command->get_options()) {
+      for (const std::string& known : option->get_lnames()) {
+        if (editDistance(known, name) <= (name.size() > 4 ? 2 : 1))
+          return ", did you mean --" + known + "?";
+      }
+    }
+    break;
+  }
+  return "";
+}
+
 int run(int argc, char** argv) {
   CLI::App app{"Distorted straight line segments: exact synthetic data, detection, evaluation."};
   app.name("dlsd");
@@ -111,6 +130,9 @@ int run(int argc, char** argv) {
   checkCommands(app, argc, argv);
   try {
     app.parse(argc, argv);
+  } catch (const CLI::ExtrasError& error) {
+    complain(error.what() + meantOption(app));
+    return kBadInput;
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() == 0) {  // --help, --version
       app.exit(error);

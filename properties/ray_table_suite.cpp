@@ -20,7 +20,7 @@ Camera shrunk(const Camera& camera, int width, int height) {
 
 struct Seen {
   double err_px = 0, err_rad_excess = 0, derivative = 0;
-  long covered = 0, asked = 0;
+  long interpolated = 0, covered = 0, asked = 0;
 };
 
 void compare(const RayTable& table, double u, double v, Seen* seen) {
@@ -33,6 +33,8 @@ void compare(const RayTable& table, double u, double v, Seen* seen) {
   const RaySample sample = table.at(u, v);
   RC_ASSERT(std::abs(sample.ray.norm() - 1) <= 1e-12);
   const double err_rad = (sample.ray - *exact).norm();
+  // By its float nodes: an answer of the camera's own is exact.
+  seen->interpolated += err_rad > 0 ? 1 : 0;
   const auto J = camera.jacobian(*exact);
   // Where directions are not resolved the answer is the camera's own.
   if (!J || !(sample.pxPerRad() > 0)) {
@@ -72,13 +74,15 @@ void expectWithinBounds() {
     RC_ASSERT(seen.derivative <= 1e-3);
     all.err_px = std::max(all.err_px, seen.err_px);
     all.derivative = std::max(all.derivative, seen.derivative);
+    all.interpolated += seen.interpolated;
     all.covered += seen.covered;
     all.asked += seen.asked;
   })) << Model::kName;
   EXPECT_GT(all.covered, all.asked / 4) << Model::kName;
-  EXPECT_GT(all.err_px, 1e-7) << Model::kName << ": nothing was interpolated";
+  EXPECT_GT(all.interpolated, all.covered / 2) << Model::kName << ": hardly anything was";
   std::cout << Model::kName << ": largest error " << all.err_px << " px, of the derivatives "
-            << all.derivative << "\n";
+            << all.derivative << "; interpolated " << all.interpolated << " of " << all.covered
+            << "\n";
 }
 
 TEST(RayTableSuite, RaysOfEveryModelAreWithinTheStatedError) {

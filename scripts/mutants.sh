@@ -3,12 +3,14 @@
 # switches on one after the other (properties/mutants.tsv) and demands that its test fails, with the
 # number of cases of the quick preset, while it passes without.
 #   scripts/mutants.sh [NAME...]      all, or the named ones
-# Prints a table; exits with 1 if a defect goes unnoticed.
+# Prints a table, with the seconds that each took; exits with 1 if a defect goes unnoticed.
+# DLSD_JOBS is the number of processes (all cores by default).
 set -euo pipefail
 cd "$(dirname "$0")/.."
 source scripts/packages.sh
 
 list=properties/mutants.tsv
+jobs=${DLSD_JOBS:-$(nproc)}
 export build=${DLSD_MUTANTS_BUILD:-build/mutants}
 # What fails need not be shrunk.
 export RC_PARAMS="${RC_PARAMS:-seed=1 max_success=200} noshrink=1" DLSD_SHRINK_SECONDS=0
@@ -32,7 +34,7 @@ done < <(grep -v '^#' $list) >"$wanted"
 need_packages "${build_packages[@]}" "${test_packages[@]}"
 cmake -S . -B "$build" -G Ninja -DCMAKE_BUILD_TYPE=Release -DDLSD_TESTS=ON -DDLSD_MUTANTS=ON
 # shellcheck disable=SC2046
-cmake --build "$build" --target $(cut -f3 "$wanted" | sort -u)
+cmake --build "$build" -j "$jobs" --target $(cut -f3 "$wanted" | sort -u)
 
 # verdict MUTANT PROGRAM FILTER: prints passed, failed, or none where no test ran to its end. In a
 # folder of its own, for the counterexamples.
@@ -53,7 +55,7 @@ verdict() {
 
 # judge "NAME<tab>SIZE<tab>PROGRAM<tab>FILTER<tab>WHAT": a line of the table.
 judge() {
-  local name size program filter what without with result
+  local name size program filter what without with result start=$SECONDS
   IFS=$'\t' read -r name size program filter what <<<"$1"
   local known="$scratch/$(sha256sum <<<"$program $filter" | cut -c1-16)"
   without=$(flock "$known.lock" bash -c '[[ -s $0 ]] || verdict "" "$1" "$2" >"$0"; cat "$0"' \
@@ -64,13 +66,16 @@ judge() {
     with=$(verdict "$name" "$program" "$filter")
     result=$([[ $with == failed ]] && echo caught || echo MISSED)
   fi
-  printf '%-26s %-7s %-10s %s: %s\n' "$name" "$size" "$result" "$program $filter" "$what"
+  printf '%-26s %-7s %-10s %4d s  %s: %s\n' "$name" "$size" "$result" $((SECONDS - start)) \
+    "$program $filter" "$what"
 }
 export -f verdict judge
 
-table=$(tr '\n' '\0' <"$wanted" | xargs -0 -P "$(nproc)" -I{} bash -c 'judge "$0"' {} | tee /dev/stderr)
+tr '\n' '\0' <"$wanted" | xargs -0 -P "$jobs" -I{} bash -c 'judge "$0"' {} | tee "$scratch/table" >&2
+table=$(<"$scratch/table")
 caught=$(grep -cE '^[^ ]+ +[a-z]+ +caught ' <<<"$table" || true)
 subtle=$(grep -cE '^[^ ]+ +subtle +caught ' <<<"$table" || true)
 others=$(grep -vE '^[^ ]+ +[a-z]+ +caught ' <<<"$table" | cut -d' ' -f1 | tr '\n' ' ' || true)
+echo "$SECONDS s with the build"
 echo "$caught of $(wc -l <"$wanted") caught ($subtle of them subtle)${others:+; not caught: $others}"
 [[ -z $others && $caught -gt 0 ]]

@@ -169,7 +169,8 @@ class Events {
       const double half = std::acos(std::min(1.0, ratio));
       return {at - half, at + half};
     };
-    addTubeEvents(tube, arc_.normal, 0, covered, [&](double phi) { addPhi(phi + middle); });
+    const double shift = middle + (DLSD_MUTANT("tube-span") ? 2e-4 : 0);
+    addTubeEvents(tube, arc_.normal, 0, covered, [&](double phi) { addPhi(phi + shift); });
   }
 
   /// Sorted angles inside (lo, hi), with both ends.

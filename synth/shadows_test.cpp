@@ -9,6 +9,7 @@
 
 #include "synth/dataset/random.h"
 #include "synth/labels.h"
+#include "synth/random_shapes.h"
 #include "synth/render.h"
 #include "synth/scene_builder.h"
 #include "synth/test_cameras.h"
@@ -161,6 +162,55 @@ TEST(ShadowEdges, PartLightFromDarkness) {
     EXPECT_EQ(wrong, 0U);
   }
   EXPECT_GT(all_on_discs, 0U);
+}
+
+// Where the shadow of a ring or a wire covers a border, the border ends: within 5e-6 m of its end
+// it parts light from darkness on one side, and lies in the dark on the other.
+TEST(ShadowEdges, EndInTheShadowsOfTubes) {
+  constexpr double kAlong = 5e-6, kAcross = 2e-7;
+  for (const Light& light : {lamp(), sun()}) {
+    size_t ends = 0, wrong = 0;
+    for (uint64_t draw = 0; draw < 12; ++draw) {
+      Random random(7, draw);
+      Scene scene = clutteredRoom(light);
+      for (int k = 0; k < 6; ++k) {
+        Tube tube = scene.tubes[static_cast<size_t>(k % 2)];
+        const Eigen::Matrix3d turn = drawRotation(&random);
+        tube.centre = {random.next(1.6, 3.8), random.next(1.2, 4.2), random.next(1.6, 2.6)};
+        tube.x = turn * tube.x;
+        tube.y = turn * tube.y;
+        scene.tubes.push_back(tube);
+      }
+      Scene bare = scene;
+      bare.tubes.clear();
+      const Raycaster raycaster(scene), bare_raycaster(bare);
+      const std::vector<Edge> bare_shadows = shadowEdges(bare, bare_raycaster);
+      for (const Edge& edge : shadowEdges(scene, raycaster)) {
+        const Vector3d d = edge.to - edge.from;
+        if (isMiddle(scene, edge) || d.norm() < 1e-3) continue;
+        const Vector3d along = d.normalized();
+        const Vector3d across = litPlaneOf(scene, edge).normal.cross(along);
+        const auto darkSides = [&](const Scene& in, const Vector3d& point) {
+          return (isDark(in, light, point + kAcross * across) ? 1 : 0) +
+                 (isDark(in, light, point - kAcross * across) ? 1 : 0);
+        };
+        for (const auto& [end, out] : {std::pair(edge.from, Vector3d(-along)), {edge.to, along}}) {
+          const Vector3d inside = end - kAlong * out, outside = end + kAlong * out;
+          const bool goes_on =
+              std::any_of(bare_shadows.begin(), bare_shadows.end(), [&](const Edge& o) {
+                const Vector3d u = o.to - o.from, w = outside - o.from;
+                const double t = u.dot(w) / u.squaredNorm();
+                return o.caster == edge.caster && t >= 0 && t <= 1 && (w - t * u).norm() < 1e-9;
+              });
+          if (!goes_on) continue;  // It ends without tubes, too.
+          ++ends;
+          wrong += darkSides(scene, inside) == 1 && darkSides(scene, outside) == 2 ? 0 : 1;
+        }
+      }
+    }
+    EXPECT_GT(ends, 100U);
+    EXPECT_LE(wrong, ends / 50);  // Where the two borders meet under a tiny angle.
+  }
 }
 
 // Along random lines on the floor, light begins and ends at the borders, or at what is round.

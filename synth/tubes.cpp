@@ -2,6 +2,7 @@
 
 #include <limits>
 
+#include "cameras/mutant.h"
 #include "synth/scene_builder.h"
 
 namespace dlsd {
@@ -95,7 +96,8 @@ std::vector<Eigen::AlignedBox3d> boxesOf(const Tube& tube, int pieces) {
   const double step = (t1 - t0) / pieces;
   // A curve is at most step^2 / 8 times its second derivative off its chord.
   const double bend = (tube.kind == Tube::Kind::kRing ? tube.x.norm() : 2 * tube.y.norm());
-  const Vector3d margin = Vector3d::Constant(tube.radius + bend * step * step / 8 + 1e-5);
+  const double sagitta = DLSD_MUTANT("tube-boxes") ? 0 : bend * step * step / 8;
+  const Vector3d margin = Vector3d::Constant(tube.radius + sagitta + 1e-5);
   for (int k = 0; k < pieces; ++k) {
     Eigen::AlignedBox3d box(spineAt(tube, t0 + k * step));
     box.extend(spineAt(tube, t0 + (k + 1) * step));
@@ -112,7 +114,8 @@ std::optional<double> enterTube(
   double s = near;
   for (int k = 0; k < kMaxSteps && s < far; ++k) {
     const Vector3d p = origin + s * direction;
-    const double distance = (p - spineAt(tube, nearestOnSpine(tube, p))).norm() - tube.radius;
+    const double radius = tube.radius * (DLSD_MUTANT("tube-entry") ? 0.999 : 1);
+    const double distance = (p - spineAt(tube, nearestOnSpine(tube, p))).norm() - radius;
     if (distance < kTouch) return s > near ? std::optional(s) : std::nullopt;
     s += distance / length;
   }

@@ -121,6 +121,7 @@ class Verifier {
       why = missing.empty() ? "all shards are there: run any of them again to join them"
                             : shardList(missing, count) + " not finished or not in this folder";
     }
+    check_.unfinished = true;
     check_.problems.push_back(folder_ + "/manifest.json: missing, " + why);
   }
 

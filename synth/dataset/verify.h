@@ -9,8 +9,9 @@
 namespace dlsd {
 
 struct DatasetCheck {
-  size_t whole = 0;  ///< Frames of which every file is there, unchanged and readable.
-  size_t named = 0;  ///< Frames that the manifests name.
+  size_t whole = 0;         ///< Frames of which every file is there, unchanged and readable.
+  size_t named = 0;         ///< Frames that the manifests name.
+  bool unfinished = false;  ///< manifest.json is missing.
   /// One sentence each, in the order of the manifests: file first, what is wrong with it.
   std::vector<std::string> problems;
 };
