@@ -150,7 +150,8 @@ struct KannalaBrandt {
     const T t = theta * theta;
     return {(theta - r_d) + (theta * t) * distortion(t),
             distortSlope(theta),
-            theta * (T(6 * k1) + t * ((T(20 * k2) + t * T(42 * k3)) + (t * t) * T(72 * k4)))};
+            theta * (T(6 * k1) + t * ((T(20 * k2) + t * T(42 * k3)) + (t * t) * T(72 * k4))),
+            T(6 * k1) + t * ((T(60 * k2) + t * T(210 * k3)) + (t * t) * T(504 * k4))};
   }
 
   /// d(theta) = theta + theta t distortion(t), t = theta^2.

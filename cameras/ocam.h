@@ -88,13 +88,14 @@ struct Ocam {
   /// -f(rho), the component of the ray along the optical axis, and its slope.
   template <class T>
   [[nodiscard, gnu::always_inline]] Jet<T> forward(T rho) const {
-    T value = T(-a[8]), slope = T(0), half_curvature = T(0);
+    T value = T(-a[8]), slope = T(0), half_curvature = T(0), sixth_of_third = T(0);
     for (size_t i = 8; i-- > 0;) {
+      sixth_of_third = sixth_of_third * rho + half_curvature;
       half_curvature = half_curvature * rho + slope;
       slope = slope * rho + value;
       value = value * rho - T(a[i]);
     }
-    return {value, slope, T(2) * half_curvature};
+    return {value, slope, T(2) * half_curvature, T(6) * sixth_of_third};
   }
 
   template <class T>
@@ -184,8 +185,9 @@ struct Ocam {
   /// |(rho, forward)| sin(field angle of rho - field angle of the ray): rises through zero once.
   template <class T>
   [[nodiscard, gnu::always_inline]] Jet<T> mismatch(T rho, T across, T along) const {
-    const auto [value, slope, curvature] = forward(rho);
-    return {rho * along - value * across, along - slope * across, -curvature * across};
+    const auto [value, slope, curvature, third] = forward(rho);
+    return {
+        rho * along - value * across, along - slope * across, -curvature * across, -third * across};
   }
 
   /// rho by two steps from the fitted start.

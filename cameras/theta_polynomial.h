@@ -85,7 +85,8 @@ struct ThetaPolynomial {
         [&](T a) {
           return Jet<T>{(T(k1) * a - m.rho) + (a * a) * (T(k2) + a * (T(k3) + a * T(k4))),
                         radiusSlope(a),
-                        T(2 * k2) + a * (T(6 * k3) + a * T(12 * k4))};
+                        T(2 * k2) + a * (T(6 * k3) + a * T(12 * k4)),
+                        T(6 * k3) + a * T(24 * k4)};
         },
         start.at(m.rho));
     return {rayAt(m, theta.x), anyOf(allOf(theta.arrived, theta.x < T(max_theta)), !m.valid)};
