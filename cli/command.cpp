@@ -176,6 +176,7 @@ void checkPlaceForFile(const std::string& path) {
     throw InputError(path + ": cannot be written: the folder " + folder.string() +
                      " does not exist");
   }
+  const AtomicFile can_be_made(path);  // And is gone again.
 }
 
 Progress::Progress(std::string noun, size_t total)
@@ -198,6 +199,10 @@ void Progress::done(size_t count) {
   }
   shown_s_ = t;
   const double rate = double(count) / (t - start_s_);
+  if (total_ == 0) {
+    tell(fmt::format("\r\033[K{} {}, {:.1f} a second", count, noun_, rate));
+    return;
+  }
   tell(fmt::format("\r\033[K{}/{} {}, {:.1f} a second, {:.0f} s left",
                    count,
                    total_,

@@ -101,11 +101,11 @@ class Interruption {
 void checkOutputs(const std::vector<std::string>& inputs, const std::vector<std::string>& outputs);
 
 /// Throws InputError if a file can't be put at `path` since its folder is missing or a folder
-/// stands there: asked before long work.
+/// stands there, SystemError if the system does not let us: asked before long work.
 void checkPlaceForFile(const std::string& path);
 
 /// Progress on standard error with rate and remaining time, on one line that is cleared at the end.
-/// Says nothing if standard error is not a terminal.
+/// Says nothing if standard error is not a terminal. A total of 0 is an unknown one.
 class Progress {
  public:
   Progress(std::string noun, size_t total);

@@ -4,7 +4,7 @@ build_packages=(
   g++ cmake ninja-build
   libeigen3-dev libembree-dev libtbb-dev
   libyaml-cpp-dev nlohmann-json3-dev libfmt-dev libcli11-dev libssl-dev libhdf5-dev libarchive-dev
-  libopencv-core-dev libopencv-imgproc-dev libopencv-imgcodecs-dev
+  libopencv-core-dev libopencv-imgproc-dev libopencv-imgcodecs-dev libopencv-videoio-dev
 )
 # python3-numpy and python3-h5py read the exports as the programs do that they are made for.
 # libopencv-contrib-dev has cv::omnidir, an independent implementation that the tests compare with.

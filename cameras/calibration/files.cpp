@@ -10,6 +10,7 @@
 #include <cstring>
 #include <filesystem>
 #include <system_error>
+#include <utility>
 
 namespace dlsd {
 namespace {
@@ -20,7 +21,7 @@ std::string reason(int error) {
   return std::generic_category().message(error);
 }
 
-/// Closes on scope exit; release() hands the closing (and its error) to the caller.
+/// Closes on scope exit.
 class FileDescriptor {
  public:
   explicit FileDescriptor(int fd) : fd_(fd) {}
@@ -30,28 +31,10 @@ class FileDescriptor {
   FileDescriptor(const FileDescriptor&) = delete;
   FileDescriptor& operator=(const FileDescriptor&) = delete;
   [[nodiscard]] int get() const { return fd_; }
-  [[nodiscard]] int release() {
-    const int fd = fd_;
-    fd_ = -1;
-    return fd;
-  }
 
  private:
   int fd_;
 };
-
-/// 0, or the errno of what failed.
-int writeAllAndClose(FileDescriptor& file, std::string_view content) {
-  while (!content.empty()) {
-    const ssize_t n = ::write(file.get(), content.data(), content.size());
-    if (n < 0) {
-      if (errno == EINTR) continue;
-      return errno;
-    }
-    content.remove_prefix(static_cast<size_t>(n));
-  }
-  return ::close(file.release()) == 0 ? 0 : errno;
-}
 
 }  // namespace
 
@@ -81,42 +64,63 @@ std::string readFile(const std::string& path, size_t max_bytes) {
   }
 }
 
-void writeFileAtomically(const std::string& path, std::string_view content) {
-  const auto refuse = [&](int error) {
-    throw SystemError(path + ": cannot be written: " + reason(error));
-  };
+AtomicFile::AtomicFile(const std::string& path) : path_(path), target_(path) {
   std::error_code ignored;
   const fs::file_status status = fs::status(path, ignored);
   if (fs::is_directory(status)) refuse(EISDIR);
   if (fs::exists(status) && !fs::is_regular_file(status)) {
     // A device or pipe must be written to, never replaced by a file.
-    FileDescriptor file(::open(path.c_str(), O_WRONLY | O_CLOEXEC));
-    if (file.get() < 0) refuse(errno);
-    if (const int error = writeAllAndClose(file, content)) refuse(error);
+    fd_ = ::open(path.c_str(), O_WRONLY | O_CLOEXEC);
+    if (fd_ < 0) refuse(errno);
     return;
   }
   // A link stays a link: the file it points to is replaced.
-  std::string target = path;
   if (fs::is_symlink(fs::symlink_status(path, ignored)) && fs::exists(status)) {
-    target = fs::canonical(path, ignored).string();
+    target_ = fs::canonical(path, ignored).string();
   }
 
   static std::atomic<unsigned> counter{0};
   std::string temporary;
-  int fd = -1;
   do {
     temporary =
-        target + ".tmp-" + std::to_string(::getpid()) + "-" + std::to_string(counter.fetch_add(1));
-    fd = ::open(temporary.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
-  } while (fd < 0 && errno == EEXIST);
-  if (fd < 0) refuse(errno);
-  FileDescriptor file(fd);
-  int error = writeAllAndClose(file, content);
-  if (error == 0 && std::rename(temporary.c_str(), target.c_str()) != 0) error = errno;
-  if (error != 0) {
-    ::unlink(temporary.c_str());
-    refuse(error);
+        target_ + ".tmp-" + std::to_string(::getpid()) + "-" + std::to_string(counter.fetch_add(1));
+    fd_ = ::open(temporary.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+  } while (fd_ < 0 && errno == EEXIST);
+  if (fd_ < 0) refuse(errno);
+  temporary_ = temporary;
+}
+
+AtomicFile::~AtomicFile() {
+  if (fd_ >= 0) ::close(fd_);
+  if (!temporary_.empty()) ::unlink(temporary_.c_str());
+}
+
+void AtomicFile::append(std::string_view content) {
+  while (!content.empty()) {
+    const ssize_t n = ::write(fd_, content.data(), content.size());
+    if (n < 0) {
+      if (errno == EINTR) continue;
+      refuse(errno);
+    }
+    content.remove_prefix(static_cast<size_t>(n));
   }
+}
+
+void AtomicFile::commit() {
+  if (::close(std::exchange(fd_, -1)) != 0) refuse(errno);
+  if (temporary_.empty()) return;
+  if (std::rename(temporary_.c_str(), target_.c_str()) != 0) refuse(errno);
+  temporary_.clear();
+}
+
+void AtomicFile::refuse(int error) const {
+  throw SystemError(path_ + ": cannot be written: " + reason(error));
+}
+
+void writeFileAtomically(const std::string& path, std::string_view content) {
+  AtomicFile file(path);
+  file.append(content);
+  file.commit();
 }
 
 void makeFolders(const std::string& path) {

@@ -29,6 +29,25 @@ struct SystemError : std::runtime_error {
 /// old or complete. Parent folders must exist. Throws SystemError naming the path and the reason.
 void writeFileAtomically(const std::string& path, std::string_view content);
 
+/// A file that grows piece by piece beside its place, so that `path` is either absent, old or
+/// complete whatever happens before commit(). Devices and pipes are written to at once.
+class AtomicFile {
+ public:
+  /// Parent folders must exist. Throws SystemError naming the path and the reason, as all here.
+  explicit AtomicFile(const std::string& path);
+  ~AtomicFile();  ///< Without commit() nothing of it remains.
+  AtomicFile(const AtomicFile&) = delete;
+  AtomicFile& operator=(const AtomicFile&) = delete;
+  void append(std::string_view content);
+  void commit();
+
+ private:
+  [[noreturn]] void refuse(int error) const;
+
+  std::string path_, target_, temporary_;  ///< As given; behind links; empty if there is none.
+  int fd_ = -1;
+};
+
 /// Creates a folder and its parents. Throws SystemError if that fails (a file stands there, no
 /// permission).
 void makeFolders(const std::string& path);

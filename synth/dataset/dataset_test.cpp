@@ -165,6 +165,8 @@ TEST(Detections, ReadFromJsonLines) {
   record.camera = "c.yaml";
   record.width = 10;
   record.height = 20;
+  record.frame = 7;
+  record.stamp_s = 0.28;
   record.time_ms = 1.5;
   DetectionLine line;
   line.points = {{1, 2}, {3, 4}};

@@ -169,6 +169,8 @@ ordered_json toJson(const DetectionRecord& record) {
   if (!record.camera.empty()) out["camera"] = record.camera;
   if (record.width > 0) out["width"] = record.width;
   if (record.height > 0) out["height"] = record.height;
+  if (record.frame) out["frame"] = *record.frame;
+  if (record.stamp_s) out["stamp_s"] = *record.stamp_s;
   out["lines"] = std::move(lines);
   if (record.time_ms) out["time_ms"] = *record.time_ms;
   return out;
@@ -210,6 +212,8 @@ DetectionRecord detectionRecordFromJson(const json& document, const std::string&
   if (j.has("camera")) record.camera = j["camera"].text();
   if (j.has("width")) record.width = j["width"].integer(1, kMaxSide);
   if (j.has("height")) record.height = j["height"].integer(1, kMaxSide);
+  if (j.has("frame")) record.frame = j["frame"].counter();
+  if (j.has("stamp_s")) record.stamp_s = atLeastZero(j["stamp_s"]);
   if (j.has("time_ms")) record.time_ms = atLeastZero(j["time_ms"]);
   for (const JsonField& field : j["lines"].array()) {
     DetectionLine line;

@@ -62,6 +62,8 @@ struct DetectionRecord {
   int width = 0, height = 0;
   std::vector<DetectionLine> lines;
   std::optional<double> time_ms;
+  std::optional<uint64_t> frame;  ///< Of a video, from 0.
+  std::optional<double> stamp_s;  ///< When the frame is shown, from the start of the video.
 };
 
 [[nodiscard]] std::string_view toString(LineKind kind);
