@@ -284,6 +284,11 @@ std::string table(const std::vector<StageTimes>& times) {
   return text + fmt::format("{:<10}  {:>9}\n", "images", times.size());
 }
 
+/// "1 line", "2 lines".
+std::string counted(size_t count, const std::string& noun) {
+  return fmt::format("{} {}{}", count, noun, count == 1 ? "" : "s");
+}
+
 int run(const Arguments& arguments) {
   Work work = workOf(arguments);
   std::optional<Image> mask;
@@ -292,7 +297,7 @@ int run(const Arguments& arguments) {
     work.inputs.push_back(arguments.mask);
   }
   const bool has_video = std::any_of(work.tasks.begin(), work.tasks.end(), isVideo);
-  const char* noun = has_video ? "frames" : "images";
+  const std::string noun = has_video ? "frame" : "image";
   std::optional<double> video_rate;
   const size_t total = framesOf(work.tasks, arguments.every, &video_rate);
 
@@ -326,13 +331,14 @@ int run(const Arguments& arguments) {
   std::vector<StageTimes> times;
   size_t done = 0, lines = 0;
   {
-    Progress progress(noun, total);
+    Progress progress(noun + "s", total);
     for (const Task& task : work.tasks) {
       Detector& detector = detectors.at(task.camera);
       const Camera& camera = detector.camera();
       const auto take = [&](const Frame& frame) {
-        interruption.check(fmt::format(
-            "{} {} are done{}", done, noun, out ? ", " + arguments.out + " was not written" : ""));
+        interruption.check(fmt::format("{} done{}",
+                                       counted(done, noun),
+                                       out ? ", " + arguments.out + " was not written" : ""));
         if (frame.image.width != camera.width() || frame.image.height != camera.height()) {
           throw InputError(fmt::format("{}: is {}x{} px, its camera {} is {}x{} px",
                                        task.path,
@@ -402,7 +408,8 @@ int run(const Arguments& arguments) {
     tell(table(times));
   }
   if (!places.empty()) {
-    tell(fmt::format("{} {}, {} lines: {}\n", done, noun, lines, fmt::join(places, ", ")));
+    tell(fmt::format(
+        "{}, {}: {}\n", counted(done, noun), counted(lines, "line"), fmt::join(places, ", ")));
   }
   return complaints.empty() ? kDone : kBadInput;
 }

@@ -266,7 +266,7 @@ TEST_F(Video, AnInterruptedRunLeavesNothingHalfWritten) {
   fs::remove(folder / "run.sh");
   EXPECT_EQ(result.code, 143);
   EXPECT_THAT(result.err, StartsWith("dlsd: interrupted: "));
-  EXPECT_THAT(result.err, EndsWith(" frames are done, d.jsonl was not written\n"));
+  EXPECT_THAT(result.err, EndsWith(" frames done, d.jsonl was not written\n"));
   EXPECT_EQ(files(), before);
 }
 
