@@ -150,8 +150,9 @@ int run(const Arguments& arguments) {
     const ResidualBand& all = conversion->residual.all;
     if (!arguments.max_px && (all.lost > 0 || !(all.max_px <= kWorthAWordPx))) {
       warnings.push_back(fmt::format(
-          "{} ({}): {} does not say this camera: {} of its pixels do not project, the others are "
-          "off by up to {:.3g} px; --max-angle leaves out the rim, --max-px refuses such a result",
+          "{} ({}): {} does not fit this camera well: {} of its pixels do not project, the others "
+          "are off by up to {:.3g} px; --max-angle leaves out the rim, --max-px refuses such a "
+          "result",
           arguments.camera.path,
           named.name,
           model,

@@ -148,7 +148,19 @@ VirtualView makeView(const Arguments& arguments, const Camera& camera, const Vie
         arguments.camera.path,
         kPinholeCropFovRad * kDegreesPerRad));
   }
-  return *crop.view;
+  if (!arguments.size.empty()) {
+    return *crop.view;
+  }
+  // Square pixels, as far as whole ones go: the side that is drawn larger is made smaller. The
+  // rectangle ends in the centres of the outermost pixels.
+  ViewRequest square = request;
+  const double ratio = crop.view->fx / crop.view->fy;
+  if (ratio > 1) {
+    square.width = std::max(2, 1 + int(std::lround((request.width - 1) / ratio)));
+  } else {
+    square.height = std::max(2, 1 + int(std::lround((request.height - 1) * ratio)));
+  }
+  return *cropView(camera, square).view;
 }
 
 /// NumPy's format 1.0: float32 of shape (height, width, 2), (u, v) of the source by view pixel.
@@ -279,6 +291,7 @@ int run(const Arguments& arguments) {
     throw InputError("--out-camera: there is no camera model for a " + arguments.view + " view");
   }
   if (!arguments.out.empty()) {
+    checkPlaceForFolder(arguments.out);
     makeFolders(arguments.out);
   }
   for (const std::string& output : outputs) {
@@ -286,16 +299,6 @@ int run(const Arguments& arguments) {
   }
 
   const ViewMaps maps = viewMaps(camera, view);
-  if (view_camera) {
-    saveCameras(arguments.out_camera, {{"cam0", *view_camera}});
-  }
-  if (!arguments.maps.empty()) {
-    writeFileAtomically(arguments.maps, npyOf(maps));
-  }
-  if (!arguments.mask.empty()) {
-    writeFileAtomically(arguments.mask, encodePng(maskOf(maps)));
-  }
-
   std::vector<std::string> complaints;
   if (!views.empty()) {
     cv::Mat map(maps.height, maps.width, CV_32FC2);
@@ -326,7 +329,18 @@ int run(const Arguments& arguments) {
       progress.done(i + 1);
     }
   }
-  print(textOf(view, arguments.view, maps));
+  if (views.empty() || complaints.size() < views.size()) {
+    if (view_camera) {
+      saveCameras(arguments.out_camera, {{"cam0", *view_camera}});
+    }
+    if (!arguments.maps.empty()) {
+      writeFileAtomically(arguments.maps, npyOf(maps));
+    }
+    if (!arguments.mask.empty()) {
+      writeFileAtomically(arguments.mask, encodePng(maskOf(maps)));
+    }
+    print(textOf(view, arguments.view, maps));
+  }
   for (const std::string& complaint : complaints) {
     complain(complaint);
   }
@@ -353,7 +367,9 @@ Run addCameraRectify(CLI::App& command) {
   command
       .add_option("--size",
                   arguments->size,
-                  "Size of the view (default: the camera's; equirectangular: from pole to pole)")
+                  "Size of the view (default: the camera's; equirectangular: from pole to pole; "
+                  "with --crop what makes pixels square within the camera's, while a size given "
+                  "stretches what is shown to it: fx is not fy then)")
       ->type_name("WxH");
   command.add_flag("--crop",
                    arguments->crop,

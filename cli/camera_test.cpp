@@ -332,7 +332,7 @@ TEST_F(CameraCli, ConvertSaysWhenTheModelCannotFollow) {
   EXPECT_EQ(poor.code, 0);
   EXPECT_EQ(std::count(poor.err.begin(), poor.err.end(), '\n'), 1) << poor.err;
   EXPECT_THAT(poor.err,
-              AllOf(HasSubstr("dlsd: rig.yaml:cam1 (cam1): pinhole does not say this camera"),
+              AllOf(HasSubstr("dlsd: rig.yaml:cam1 (cam1): pinhole does not fit this camera well"),
                     HasSubstr("pixels do not project"),
                     HasSubstr("--max-angle"),
                     HasSubstr("--max-px")));
@@ -495,6 +495,31 @@ TEST_F(CameraCli, RectifyCropsWithoutBorders) {
   expectRefused(mirror, 2, "give one by --fov");
   EXPECT_EQ(dlsd(mirror + "--fov 100").code, 0);
   expectRefused(mirror + "--rotate 180,0,0 --fov 100", 2, "axis of the view");
+}
+
+TEST_F(CameraCli, RectifyCropsToSquarePixelsUnlessASizeIsGiven) {
+  const std::string crop = "camera rectify wide.yaml --crop --fov 140 --out-camera c.yaml";
+  const auto focal = [&] {
+    const dlsd::Camera camera = dlsd::loadCamera((folder / "c.yaml").string());
+    EXPECT_LE(camera.width(), 160);
+    EXPECT_LE(camera.height(), 120);
+    EXPECT_EQ(std::max(camera.width() / 160.0, camera.height() / 120.0), 1);
+    return std::pair(camera.params()[0], camera.params()[1]);
+  };
+  ASSERT_EQ(dlsd(crop).code, 0);
+  const auto [fx, fy] = focal();
+  EXPECT_NEAR(fx / fy, 1, 0.5 / 80);  // half of some 87 pixels
+  ASSERT_EQ(dlsd(crop + " --size 160x120").code, 0);
+  const auto [wide_fx, wide_fy] = focal();
+  EXPECT_GE(std::abs(wide_fx / wide_fy - 1), 0.02);
+}
+
+TEST_F(CameraCli, RectifyMakesNothingIfNoImageIsGood) {
+  write("small.pgm", "P5 2 2 255\nabcd");
+  fs::create_directories(folder / "v");
+  expectRefused("camera rectify wide.yaml small.pgm --out v --out-camera c.yaml --maps m.npy",
+                2,
+                "small.pgm: is 2x2 px, the camera is 160x120 px");
 }
 
 TEST_F(CameraCli, RectifyMakesTheCameraOfAPanorama) {

@@ -346,13 +346,9 @@ TEST_F(Cli, UnwritableOutputsAreThree) {
   ASSERT_EQ(dlsd("detect --data data --out det.jsonl").code, 0);
   write("file", "stands here");
   const std::string detect = "detect --camera wide.yaml data/images/000000.png --out ";
-  expectRefused("generate --camera wide.yaml --count 1 --out file", 3, "file");
-  expectRefused("generate --camera wide.yaml --count 1 --out file/data", 3, "file");
   expectRefused("generate --camera wide.yaml --count 1 --out /proc/dlsd", 3, "/proc/dlsd");
   expectRefused(detect + "/dev/full", 3, "/dev/full");
-  expectRefused(detect + "d.jsonl --overlay file", 3, "file");
   expectRefused("evaluate --data data --json /dev/full", 3, "/dev/full");
-  expectRefused("report --data data --out file", 3, "file");
   expectRefused("report --data data --detections det.jsonl --out /proc/dlsd", 3, "/proc/dlsd");
   EXPECT_EQ(contentOf(folder / "file"), "stands here");
   for (const char* command :
@@ -375,6 +371,12 @@ TEST_F(Cli, OutputsWhereNoFileCanBeAreTwo) {
   expectRefused(detect + "file/d.jsonl", 2, "file/d.jsonl");
   expectRefused(detect + "data", 2, "data: cannot be written: a folder stands there");
   expectRefused("evaluate --data data --json nowhere/e.json", 2, "the folder nowhere");
+  expectRefused("generate --camera wide.yaml --out file", 2, "file is no folder");
+  expectRefused("generate --camera wide.yaml --out file/data", 2, "file is no folder");
+  expectRefused(detect + "d.jsonl --overlay file", 2, "file is no folder");
+  expectRefused("report --data data --out file", 2, "file is no folder");
+  expectRefused("export --format ulsd --data data --out file/u", 2, "file is no folder");
+  EXPECT_EQ(contentOf(folder / "file"), "stands here");
 }
 
 TEST_F(Cli, UnknownCommandsAreTwoWhateverFollows) {

@@ -179,6 +179,22 @@ void checkPlaceForFile(const std::string& path) {
   const AtomicFile can_be_made(path);  // And is gone again.
 }
 
+void checkPlaceForFolder(const std::string& path) {
+  namespace fs = std::filesystem;
+  std::error_code error;
+  fs::path at = fs::absolute(path);
+  while (!fs::exists(at, error) && at.has_relative_path()) {
+    at = at.parent_path();
+  }
+  if (!fs::is_directory(at, error)) {
+    throw InputError(fmt::format("{}: {} is no folder", path, at.string()));
+  }
+  if (::access(at.c_str(), W_OK) != 0) {
+    throw SystemError(fmt::format(
+        "{}: cannot write in {}: {}", path, at.string(), std::generic_category().message(errno)));
+  }
+}
+
 Progress::Progress(std::string noun, size_t total)
     : noun_(std::move(noun)),
       total_(total),

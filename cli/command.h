@@ -104,6 +104,10 @@ void checkOutputs(const std::vector<std::string>& inputs, const std::vector<std:
 /// stands there, SystemError if the system does not let us: asked before long work.
 void checkPlaceForFile(const std::string& path);
 
+/// Throws InputError if there can't be a folder at `path` since a file stands there or on the way,
+/// SystemError if the system does not let us: asked before long work.
+void checkPlaceForFolder(const std::string& path);
+
 /// Progress on standard error with rate and remaining time, on one line that is cleared at the end.
 /// Says nothing if standard error is not a terminal. A total of 0 is an unknown one.
 class Progress {

@@ -185,6 +185,7 @@ class Overlays {
       outputs.push_back(pathOf(task, 0));
     }
     checkOutputs(work.inputs, outputs);
+    checkPlaceForFolder(path_);
     makeFolders(path_);
   }
 

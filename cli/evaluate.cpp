@@ -2,12 +2,10 @@
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
-#include <unistd.h>
 
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
 #include <algorithm>
-#include <cerrno>
 #include <charconv>
 #include <deque>
 #include <filesystem>
@@ -228,23 +226,6 @@ std::vector<NamedSource> sourcesOf(const Arguments& arguments,
 /// Where a report puts its files.
 std::vector<std::string> reportFiles(const std::string& folder) {
   return {folder + "/index.html", folder + "/figures.csv", folder + "/evaluation.json"};
-}
-
-/// Throws if there can't be a folder at `path`: asked before long work.
-void checkPlaceForFolder(const std::string& path) {
-  namespace fs = std::filesystem;
-  std::error_code error;
-  fs::path at = fs::absolute(path);
-  while (!fs::exists(at, error) && at.has_relative_path()) {
-    at = at.parent_path();
-  }
-  if (!fs::is_directory(at, error)) {
-    throw InputError(fmt::format("{}: {} is no folder", path, at.string()));
-  }
-  if (::access(at.c_str(), W_OK) != 0) {
-    throw SystemError(fmt::format(
-        "{}: cannot write in {}: {}", path, at.string(), std::generic_category().message(errno)));
-  }
 }
 
 /// The paper's sequence in `out`/data, if the user has none.

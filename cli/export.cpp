@@ -35,6 +35,7 @@ int run(Arguments& arguments) {
   options.shard_bytes = arguments.shard_mib << 20;
   options.check();
   const Dataset dataset(arguments.data);
+  checkPlaceForFolder(options.out);
   ExportResult result;
   {
     Progress progress("frames", dataset.size());

@@ -6,6 +6,7 @@
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
 #include <algorithm>
+#include <cctype>
 #include <charconv>
 #include <cstdint>
 #include <filesystem>
@@ -68,15 +69,19 @@ void addRandomCameras(const std::string& text,
 }
 
 /// The name of a camera in the dataset: the file's stem, and the camera's name too if one is
-/// chosen.
+/// chosen; what names may not have becomes '_'.
 std::string nameOf(const std::string& path_and_camera) {
-  std::error_code ignored;
-  if (std::filesystem::exists(path_and_camera, ignored)) {
-    return std::filesystem::path(path_and_camera).stem().string();
+  const std::string file = calibrationFile(path_and_camera);
+  std::string name = std::filesystem::path(file).stem().string();
+  if (file != path_and_camera) {
+    name += "-" + path_and_camera.substr(file.size() + 1);
   }
-  const size_t colon = path_and_camera.rfind(':');
-  return std::filesystem::path(path_and_camera.substr(0, colon)).stem().string() + "-" +
-         path_and_camera.substr(colon + 1);
+  std::replace_if(
+      name.begin(),
+      name.end(),
+      [](unsigned char c) { return c >= 0x80 || !(std::isalnum(c) || c == '_' || c == '-'); },
+      '_');
+  return name;
 }
 
 void readShard(const std::string& text, GenerateOptions* options) {
@@ -150,6 +155,7 @@ int run(Arguments& arguments) {
     options.planes.push_back(planeFromName(name).value_or(PlaneKind::kDepth));
   }
   options.check();
+  checkPlaceForFolder(options.out);
 
   GenerateResult result{};
   {

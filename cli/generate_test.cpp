@@ -427,4 +427,16 @@ TEST_F(GenerateCli, VerifyUnderstandsShards) {
   EXPECT_THAT(result.out, HasSubstr("is not what another manifest says of this frame"));
 }
 
+TEST_F(Cli, CamerasAreNamedAfterAnyFile) {
+  write("wide.kalibr.yaml", kWide);
+  write("my caf\xc3\xa9.yaml", kWide);
+  const Result result = dlsd(
+      "generate --camera wide.kalibr.yaml:cam0 --camera 'my caf\xc3\xa9.yaml' --count 1 --out d");
+  ASSERT_EQ(result.code, 0) << result.err;
+  EXPECT_TRUE(fs::exists(folder / "d/cameras/wide_kalibr-cam0.yaml"));
+  EXPECT_TRUE(fs::exists(folder / "d/cameras/my_caf__.yaml"));
+  expectRefused(
+      "generate --camera wide.kalibr.yaml --camera 'wide kalibr.yaml' --out e", 2, "wide");
+}
+
 }  // namespace

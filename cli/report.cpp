@@ -26,6 +26,7 @@ int run(Arguments& arguments) {
     source = detectionsOfFile(dataset, arguments.detections);
     options.detections_title = std::filesystem::path(arguments.detections).filename().string();
   }
+  checkPlaceForFolder(options.out);
   const Report report = writeReport(dataset, source, options);
   std::string text = table(report.statistics);
   if (report.summary) {

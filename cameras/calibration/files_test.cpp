@@ -84,6 +84,27 @@ TEST_F(Files, ADeviceIsWrittenToAndNotReplaced) {
   EXPECT_TRUE(fs::is_character_file("/dev/null"));
 }
 
+TEST_F(Files, WhatGrowsIsThereAfterCommitAndNotBefore) {
+  writeFileAtomically(path("a"), "old");
+  {
+    AtomicFile file(path("a"));
+    file.append("one ");
+    EXPECT_EQ(entries(), 2U);
+    EXPECT_EQ(readFile(path("a")), "old");
+  }
+  EXPECT_EQ(entries(), 1U);
+  EXPECT_EQ(readFile(path("a")), "old");
+  AtomicFile file(path("a"));
+  for (const char* part : {"one ", "", "two"}) {
+    file.append(part);
+  }
+  file.commit();
+  EXPECT_EQ(readFile(path("a")), "one two");
+  EXPECT_EQ(entries(), 1U);
+  EXPECT_THAT(messageOf<SystemError>([&] { const AtomicFile none(path("nowhere/b")); }),
+              AllOf(StartsWith(path("nowhere/b")), HasSubstr("No such file")));
+}
+
 TEST_F(Files, ReadingNamesFileAndReason) {
   EXPECT_THAT(messageOf<InputError>([&] { (void)readFile(path("absent")); }),
               AllOf(StartsWith(path("absent")), HasSubstr("No such file")));
