@@ -1,13 +1,18 @@
 #include "properties/gen.h"
 
 #include <gmock/gmock.h>
+#include <gtest/gtest-spi.h>
 #include <gtest/gtest.h>
+#include <rapidcheck.h>
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <numbers>
 #include <set>
 #include <sstream>
+
+#include "properties/holds.h"
 
 namespace dlsd {
 namespace {
@@ -204,6 +209,34 @@ TEST(GenCamera, IsShownInFull) {
   EXPECT_EQ(out.str(),
             "pinhole(fx = 0.10000000000000001, fy = 2, cx = 3, cy = 4) 640 x 480, limit "
             "3.1415926535897931 rad");
+}
+
+// --- holds ---
+
+void holdsUpTo10() {
+  holds(1, [] {
+    const int drawn = *genInt(0, 1000);
+    if (drawn > 10) RC_FAIL("is more than 10");
+  });
+}
+
+// Also where there is no time for shrinking, the case that failed is shown with what it drew.
+TEST(Holds, ShowsTheCaseThatFails) {
+  EXPECT_NONFATAL_FAILURE(holdsUpTo10(), "\nint:\n11\n");
+  EXPECT_NONFATAL_FAILURE(holdsUpTo10(), "is more than 10");
+  ASSERT_EQ(setenv("DLSD_SHRINK_SECONDS", "0", 1), 0);
+  EXPECT_NONFATAL_FAILURE(holdsUpTo10(), "\nint:\n");
+  EXPECT_NONFATAL_FAILURE(holdsUpTo10(), "is more than 10");
+  ASSERT_EQ(unsetenv("DLSD_SHRINK_SECONDS"), 0);
+}
+
+TEST(Holds, FailsWhereMostCasesAreDiscarded) {
+  EXPECT_NONFATAL_FAILURE(holds(1, [] { RC_PRE(*genInt(0, 9) == 0); }), "Gave up");
+}
+
+TEST(Holds, CountsItsCases) {
+  const auto wanted = std::max(10, rc::detail::configuration().testParams.maxSuccess / 2);
+  EXPECT_EQ(holds(0.5, [] { RC_ASSERT(*genInt(0, 9) <= 9); }), wanted);
 }
 
 }  // namespace

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 #include <rapidcheck.h>
+#include <rapidcheck/detail/TestListenerAdapter.h>
 
 #include <algorithm>
 #include <chrono>
@@ -12,19 +13,40 @@
 
 namespace dlsd {
 
+namespace {
+
+/// Keeps the last case that failed. RapidCheck itself runs it once more for its report, when
+/// the time for shrinking may be over.
+class LastFailure : public rc::detail::TestListenerAdapter {
+ public:
+  void onTestCaseFinished(const rc::detail::CaseDescription& tried) override { see(tried); }
+  void onShrinkTried(const rc::detail::CaseDescription& tried, bool /*accepted*/) override {
+    see(tried);
+  }
+  [[nodiscard]] const std::optional<rc::detail::CaseDescription>& get() const { return last_; }
+
+ private:
+  void see(const rc::detail::CaseDescription& tried) {
+    if (tried.result.type == rc::detail::CaseResult::Type::Failure) last_ = tried;
+  }
+  std::optional<rc::detail::CaseDescription> last_;
+};
+
+}  // namespace
+
 long holds(double share, const std::function<void()>& property) {
   using Clock = std::chrono::steady_clock;
   const char* given = std::getenv("DLSD_SHRINK_SECONDS");
   const std::chrono::duration<double> most_shrinking(given != nullptr ? std::atof(given) : 5);
   long cases = 0;
-  std::string message;
   std::optional<Clock::time_point> first_failure;
   rc::detail::TestParams params = rc::detail::configuration().testParams;
   params.maxSuccess = std::max(10, static_cast<int>(params.maxSuccess * share));
   params.maxDiscardRatio = 1;
   rc::detail::TestMetadata metadata;
   metadata.id = ::testing::UnitTest::GetInstance()->current_test_info()->name();
-  const auto result = rc::detail::checkTestable(
+  LastFailure last;
+  auto result = rc::detail::checkTestable(
       [&] {
         // RapidCheck shrinks for as long as it likes: later candidates count as no failure.
         if (first_failure && Clock::now() - *first_failure > most_shrinking) return;
@@ -32,18 +54,23 @@ long holds(double share, const std::function<void()>& property) {
         try {
           property();
         } catch (const rc::detail::CaseResult& failure) {
-          if (failure.type == rc::detail::CaseResult::Type::Failure) {
-            message = failure.description;
-            if (!first_failure) first_failure = Clock::now();
-          }
+          const bool failed = failure.type == rc::detail::CaseResult::Type::Failure;
+          if (failed && !first_failure) first_failure = Clock::now();
           throw;
         }
       },
       metadata,
-      params);
+      params,
+      last);
+  rc::detail::FailureResult failure;
+  if (result.match(failure) && last.get()) {
+    failure.counterExample = last.get()->example();
+    failure.description = last.get()->result.description;
+    result = failure;
+  }
   std::ostringstream text;
   rc::detail::printResultMessage(result, text);
-  EXPECT_TRUE(result.is<rc::detail::SuccessResult>()) << text.str() << message;
+  EXPECT_TRUE(result.is<rc::detail::SuccessResult>()) << text.str();
   return cases;
 }
 
