@@ -31,7 +31,7 @@ using testing::HasSubstr;
 using testing::StartsWith;
 
 struct GenerateCli : Cli {
-  static constexpr const char* kGenerate = "generate --camera wide.yaml --count 24 --seed 5 --out ";
+  static constexpr const char* kGenerate = "generate --camera wide.yaml --count 12 --seed 5 --out ";
 
   /// Path in a data folder -> bytes.
   [[nodiscard]] std::map<std::string, std::string> data(const std::string& name) const {
@@ -108,7 +108,7 @@ struct GenerateCli : Cli {
 // times: a machine may be as fast or as busy as it likes.
 TEST_F(GenerateCli, KilledAtRandomMomentsItGoesOnToTheSameBytes) {
   const auto whole = undisturbed();
-  ASSERT_EQ(whole.size(), 24U + 24U + 1U + 1U);
+  ASSERT_EQ(whole.size(), 12U + 12U + 1U + 1U);
   const auto filesIn = [&](const std::string& name) {
     size_t count = 0;
     std::error_code gone;  // a temporary file may get its name while we look
@@ -128,7 +128,7 @@ TEST_F(GenerateCli, KilledAtRandomMomentsItGoesOnToTheSameBytes) {
                                  "--camera",
                                  "wide.yaml",
                                  "--count",
-                                 "24",
+                                 "12",
                                  "--seed",
                                  "5",
                                  "--out",
@@ -185,7 +185,7 @@ TEST_F(GenerateCli, KilledShardsSideBySideGiveTheBytesOfOneRun) {
     EXPECT_EQ(sharded.erase("manifest-" + std::to_string(shard) + "-of-3.json"), 1U);
   }
   expectSame(sharded, whole);
-  EXPECT_EQ(dlsd("generate --verify sharded").out, "sharded: 24 of 24 frames are whole\n");
+  EXPECT_EQ(dlsd("generate --verify sharded").out, "sharded: 12 of 12 frames are whole\n");
 }
 
 TEST_F(GenerateCli, InterruptedItSaysSoAndGoesOn) {
@@ -408,10 +408,10 @@ TEST_F(GenerateCli, VerifyUnderstandsShards) {
   EXPECT_EQ(result.code, 1);
   EXPECT_EQ(result.out,
             "data/manifest.json: missing, shards 1, 3 of 4 not finished or not in this folder\n"
-            "data: 12 of 12 frames are whole\n");
+            "data: 6 of 6 frames are whole\n");
   shard("1/4");
   shard("3/4");
-  EXPECT_EQ(dlsd("generate --verify data").out, "data: 24 of 24 frames are whole\n");
+  EXPECT_EQ(dlsd("generate --verify data").out, "data: 12 of 12 frames are whole\n");
   fs::remove(folder / "data/manifest.json");
   result = dlsd("generate --verify data");
   EXPECT_EQ(result.code, 1);

@@ -13,8 +13,9 @@ build=build/coverage
 if ! configured coverage DLSD_TESTS=ON; then configure coverage DLSD_TESTS=ON; fi
 build coverage
 find $build -name '*.gcda' -delete
+# A test that fails (or takes too long: counting makes it some ten times as slow) has run its lines.
 RC_PARAMS=${RC_PARAMS:-seed=1 max_success=20} \
-  ctest --test-dir $build -L quick -j"$(nproc)" --output-on-failure "$@" | tail -5
+  ctest --test-dir $build -L quick -j"$(nproc)" --output-on-failure "$@" | tail -5 || true
 gcovr --root . --object-directory $build --json-summary $build/coverage.json \
   --exclude-unreachable-branches --exclude-throw-branches -j "$(nproc)" \
   --gcov-ignore-parse-errors \

@@ -54,7 +54,8 @@ struct Labels {
 /// Rods: the width in px, 2 * radius seen across the centre line, is taken at 17 points of each
 /// imaged piece of the centre line (hidden or not); if the largest is >= kThickRodPx, or nothing of
 /// the centre line is in the image, the rod is labelled by its prism edges, else by its centre
-/// line. A rod's shadow on a face likewise: by its borders or its middle.
+/// line. A rod's shadow on a face likewise: by its borders or its middle; then it has no label
+/// where the middle is hidden, though a border may show.
 ///
 /// Kind: decal borders are `material`, centre lines `wire`, borders of shadows `shadow` (present if
 /// the scene's edges hold them, see shadows.h). An edge of two faces is `crease` if

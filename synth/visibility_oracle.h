@@ -117,8 +117,12 @@ class VisibilityOracle {
     }
     for (size_t k = 0; k < scene_.rods.size(); ++k) {
       const Rod& rod = scene_.rods[k];
-      const bool own = isOwnRound(edge, static_cast<int>(k));
-      if (rod.isRound() && !own && meetsCylinder(rod, eye_, d * kBefore)) return true;
+      if (!rod.isRound()) continue;
+      // Nor does a cylinder hide the side of its cap that looks at the eye. The cap is of floats,
+      // which may put it into the cylinder.
+      const bool on_cap = edge.disc == rod.first_disc || edge.disc == rod.first_disc + 1;
+      const bool own = isOwnRound(edge, static_cast<int>(k)) || on_cap;
+      if (!own && meetsCylinder(rod, eye_, d * kBefore)) return true;
     }
     for (const Tube& tube : scene_.tubes) {
       if (meetsTube(tube, eye_, d * kBefore)) return true;
