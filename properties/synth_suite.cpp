@@ -452,23 +452,31 @@ TEST(SynthSuite, LabelsAreComplete) {
         });
       }
     }
-    forHiddenShadowMiddles(seen, camera, [&](const Vector2d& a, const Vector2d& b) {
-      if (!((a - b).norm() < 8)) return;
-      pieces.forEachCell(a.cwiseMin(b), a.cwiseMax(b), 2, [&](auto& list) {
-        list.push_back({a, b, kInBarPx});
+    const auto unexplainedJumps = [&] {
+      std::vector<Jump> unexplained;
+      for (const Jump& jump : jumps) {
+        bool explained = false;
+        pieces.forEachCell(jump.pixel, jump.pixel, 0, [&](const auto& list) {
+          for (const Piece& piece : list) {
+            explained = explained || distanceTo({piece.from, piece.to}, jump.pixel) <= piece.reach;
+          }
+        });
+        if (!explained) unexplained.push_back(jump);
+      }
+      return unexplained;
+    };
+    std::vector<Jump> unexplained = unexplainedJumps();
+    StraightRun run = longestStraightRun(camera, unexplained);
+    if (!(run.length_px < kLongPx)) {
+      forHiddenShadowMiddles(seen, camera, [&](const Vector2d& a, const Vector2d& b) {
+        if (!((a - b).norm() < 8)) return;
+        pieces.forEachCell(a.cwiseMin(b), a.cwiseMax(b), 2, [&](auto& list) {
+          list.push_back({a, b, kInBarPx});
+        });
       });
-    });
-    std::vector<Jump> unexplained;
-    for (const Jump& jump : jumps) {
-      bool explained = false;
-      pieces.forEachCell(jump.pixel, jump.pixel, 0, [&](const auto& list) {
-        for (const Piece& piece : list) {
-          explained = explained || distanceTo({piece.from, piece.to}, jump.pixel) <= piece.reach;
-        }
-      });
-      if (!explained) unexplained.push_back(jump);
+      unexplained = unexplainedJumps();
+      run = longestStraightRun(camera, unexplained);
     }
-    const StraightRun run = longestStraightRun(camera, unexplained);
     RC_LOG() << jumps.size() << " jumps, " << unexplained.size() << " without a label; longest run "
              << run.length_px << " px from " << run.from.transpose() << " to "
              << run.to.transpose();
