@@ -253,6 +253,19 @@ StepGain EdgeProfiler::gain(double blur_variance) const {
   return {between(narrow_gain_), between(wide_gain_)};
 }
 
+EdgeResponse EdgeProfiler::stepResponse(double position_px, double blur_variance) const {
+  std::array<double, 4> sums{};
+  for (size_t i = 0; i < kTaps; ++i) {
+    const double t = static_cast<double>(i) - kCentreTap - position_px;
+    const double level = 0.5 * std::erfc(-t / std::sqrt(2 * blur_variance));
+    for (size_t k = 0; k < 4; ++k) sums[k] += level * kernels_[0].tap(k, i);
+  }
+  return {static_cast<float>(sums[0]) * scale_[0],
+          static_cast<float>(sums[1]) * scale_[1],
+          static_cast<float>(sums[2]) * scale_[2],
+          static_cast<float>(sums[3]) * scale_[3]};
+}
+
 template <class T>
 void EdgeProfiler::measureTyped(const T* data,
                                 const EdgeWindow& window,

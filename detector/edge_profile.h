@@ -65,6 +65,10 @@ class EdgeProfiler {
   /// For a step of this blur.
   [[nodiscard]] StepGain gain(double blur_variance) const;
 
+  /// Responses to a step of one grey level that rises so many px from here, seen through a Gaussian
+  /// blur of this variance.
+  [[nodiscard]] EdgeResponse stepResponse(double position_px, double blur_variance) const;
+
   /// Standard deviations of one row's responses in white noise of one grey level.
   [[nodiscard]] const EdgeResponse& whiteNoise() const { return white_noise_; }
 

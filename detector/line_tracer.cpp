@@ -7,7 +7,8 @@
 namespace dlsd {
 namespace {
 
-/// A 3D line subtends less than pi; beyond this the tracer is going round a great circle.
+/// A 3D line subtends less than pi. What goes on (a horizon) is cut here; the rest is a line of its
+/// own.
 constexpr double kMaxAngleRad = 3.1;
 /// Rows that cross the curve, until it has turned this far beyond 45 degrees.
 constexpr double kTurnRatio = 1.25;
@@ -24,6 +25,11 @@ constexpr float kModelVariance = 0.03F * 0.03F;
 /// Wide over narrow response: 1 for a step, 1.2 for one of blur 1.5 px, 1.3 for two alike that are
 /// 3 px apart, 1.7 for shading that rises evenly.
 constexpr float kMaxWideRatio = 1.45F;
+/// Runs whose level is less than this times the line's, or that much above ...
+constexpr float kFaintLevel = 0.3F;
+/// ... must be this long at its ends.
+constexpr int kMinStrangeRunPx = 20;
+constexpr int kMinFlippedRunPx = 12;
 /// How fast the bound of the residuals follows them, from four rows to the next.
 constexpr float kDriftRate = 0.3F;
 /// Standard deviations of noise that the response of an edge exceeds.
@@ -35,6 +41,12 @@ double narrowLevel(const EdgeResponse& r) {
   return odd == 0 ? 0 : std::abs(odd) * (1 + 0.15 * std::min(1.0, even * even / (odd * odd)));
 }
 
+/// The same for every camera.
+const BarProfiles& barProfiles() {
+  static const BarProfiles profiles{EdgeProfiler()};
+  return profiles;
+}
+
 /// Nearest pixel, of positions not far outside the image.
 int pixelOf(float position) {
   return static_cast<int>(position + 0.5F);
@@ -43,7 +55,7 @@ int pixelOf(float position) {
 }  // namespace
 
 LineTracer::LineTracer(const RayTable& rays, const ValidationOptions& options)
-    : rays_(rays), options_(options) {}
+    : rays_(rays), options_(options), bars_(barProfiles()) {}
 
 void LineTracer::setImage(const GreyPixels& pixels,
                           const BitRows& usable,
@@ -210,6 +222,59 @@ bool LineTracer::evaluate(Front* front, int direction, std::array<Quad, 2>* quad
   return true;
 }
 
+/// Eight rows around a point near the curve.
+bool LineTracer::evaluateAround(const Eigen::Vector2f& px, std::array<Quad, 2>* quads) const {
+  Front front;
+  front.position = px.cast<double>();
+  const RaySample sample = rays_.at(front.position.x(), front.position.y());
+  const Eigen::Vector2d g(sample.du.dot(normal_), sample.dv.dot(normal_));
+  const int a = std::abs(g.x()) >= std::abs(g.y()) ? 0 : 1;
+  if (!(std::abs(g[a]) > 0)) return false;
+  front.position[a] -= sample.ray.dot(normal_) / g[a];
+  front.position[1 - a] -= 4;
+  front.position[a] += 4 * g[1 - a] / g[a];
+  return evaluate(&front, +1, quads);
+}
+
+void LineTracer::measureBlur(const std::vector<PlanarPiece>& pieces,
+                             const std::vector<Eigen::Vector2f>& nodes) {
+  constexpr size_t kMaxPieces = 128;
+  constexpr float kLeastSigmas = 20;       // of the level; the ratio of levels is good to 5 %
+  constexpr float kMostEven = 0.15F;       // px between the offsets that the two filters see
+  constexpr size_t kPrior = 3;
+  std::array<double, kMaxPieces + kPrior> found;
+  found.fill(kUsualVariance);
+  size_t count = kPrior;
+  wide_ = false;
+  bound_px_ = widest_px_ = 1.5F;
+  drift_px_ = 0;
+  offset_gain_ = 1;
+  const size_t stride = pieces.size() / kMaxPieces + 1;
+  for (size_t i = 0; i < pieces.size(); i += stride) {
+    const PlanarPiece& piece = pieces[i];
+    normal_ = piece.normal;
+    std::array<Quad, 2> pair;
+    if (!evaluateAround(nodes[piece.first_node + piece.nodes / 2], &pair)) continue;
+    if (!pair[0].is_edge || !pair[1].is_edge) continue;
+    const EdgeResponse &a = pair[0].mean, &b = pair[1].mean;
+    const float level = a.odd_narrow + b.odd_narrow, wide_level = a.odd_wide + b.odd_wide;
+    if (!(std::abs(level) >= kLeastSigmas * std::max(noise_.odd_narrow, noise_.odd_wide)) ||
+        !(a.odd_narrow * b.odd_narrow > 0)) {
+      continue;
+    }
+    const float apart = (a.even_wide + b.even_wide) / wide_level -
+                        (a.even_narrow + b.even_narrow) / level;
+    if (!(std::abs(apart) <= kMostEven)) continue;
+    const auto ratio = static_cast<double>(level / wide_level);
+    if (!(ratio <= profiler_.sharpestRatio() && ratio >= profiler_.softestRatio())) continue;
+    const auto across = static_cast<double>(pair[0].perpendicular);
+    found[count++] = profiler_.blurVariance(ratio) * across * across;
+  }
+  const auto middle = found.begin() + static_cast<ptrdiff_t>(count / 2);
+  std::nth_element(found.begin(), middle, found.begin() + static_cast<ptrdiff_t>(count));
+  blur_px2_ = *middle;
+}
+
 void LineTracer::judge(Quad* quad) const {
   const float odd = wide_ ? quad->mean.odd_wide : quad->mean.odd_narrow;
   const float even = wide_ ? quad->mean.even_wide : quad->mean.even_narrow;
@@ -284,7 +349,12 @@ void LineTracer::extend(int direction, Front* front) {
         front->at_border = !seen_->contains(x, y);
         break;
       }
-      if (!last_ray.isZero()) angle_rad_ += (q.ray - last_ray).norm();
+      const double step_rad = last_ray.isZero() ? 0 : (q.ray - last_ray).norm();
+      if (angle_rad_ + step_rad > kMaxAngleRad) {
+        front->ended = true;
+        break;
+      }
+      angle_rad_ += step_rad;
       last_ray = q.ray;
       quads_.push_back(q);
       if (q.is_edge) {
@@ -296,26 +366,45 @@ void LineTracer::extend(int direction, Front* front) {
         break;
       }
     }
-    if (angle_rad_ > kMaxAngleRad) front->ended = true;
     if (points_ >= points_at_fit_ + std::max(4, points_at_fit_ / 2) && !refit()) {
       front->ended = true;
     }
   }
 }
 
-/// How many quads from `tip` on, which is at an end of the line, lie beyond the last edge or in
-/// runs shorter than kMinRunPx that are only reached across a gap.
+/// How many quads from `tip` on, which is at an end of the line, don't belong to it: gaps, and runs
+/// of one sign and strength too short to be believed. What is much fainter or stronger than the
+/// line is mostly some other edge, that the curve happens to meet.
 template <class Iterator>
-static ptrdiff_t looseQuads(Iterator tip, Iterator other_end) {
+ptrdiff_t LineTracer::looseQuads(Iterator tip, Iterator other_end) const {
+  const auto levelOf = [&](const Quad& q) { return wide_ ? q.mean.odd_wide : q.mean.odd_narrow; };
+  float level = 0, balance = 0;
+  int edges = 0;
+  for (Iterator q = tip; q != other_end; ++q) {
+    if (!q->is_edge) continue;
+    level += std::abs(levelOf(*q));
+    balance += levelOf(*q);
+    ++edges;
+  }
+  level /= static_cast<float>(std::max(edges, 1));
+  const auto differs = [&](float l) {
+    return std::abs(l) < kFaintLevel * level || kFaintLevel * std::abs(l) > level;
+  };
   Iterator at = tip;
   for (;;) {
     while (at != other_end && !at->is_edge) ++at;
+    if (at == other_end) return at - tip;
+    const bool differs_here = differs(levelOf(*at));
+    const bool rises = levelOf(*at) > 0;
+    const int min_run_px = differs_here ? kMinStrangeRunPx : (balance > 0) == rises ? kMinRunPx : kMinFlippedRunPx;
     Iterator behind = at;
     int run_px = 0;
-    for (; behind != other_end && behind->is_edge && run_px < LineTracer::kMinRunPx; ++behind) {
-      run_px += LineTracer::kQuadPx;
+    while (behind != other_end && behind->is_edge && run_px < min_run_px &&
+           differs(levelOf(*behind)) == differs_here && (levelOf(*behind) > 0) == rises) {
+      run_px += kQuadPx;
+      ++behind;
     }
-    if (behind == other_end || run_px >= LineTracer::kMinRunPx) return at - tip;
+    if (behind == other_end || run_px >= min_run_px) return at - tip;
     at = behind;
   }
 }
@@ -457,6 +546,41 @@ LineTracer::End LineTracer::endOf(size_t first, size_t last, bool at_border) con
   return end;
 }
 
+/// The sides of a thin bar push each other apart: back to where they are.
+void LineTracer::moveBarSides() {
+  // Responses are means over so many quads on both sides.
+  constexpr ptrdiff_t kReach = 4;
+  constexpr float kShare = 0.15F;  // of the shift, what may be wrong with it
+  const auto size = static_cast<ptrdiff_t>(quads_.size());
+  shifts_.assign(quads_.size(), 0);
+  for (ptrdiff_t i = 0; i < size; ++i) {
+    const Quad& q = quads_[static_cast<size_t>(i)];
+    if (!q.is_edge) continue;
+    EdgeResponse sum{};
+    for (ptrdiff_t k = std::max<ptrdiff_t>(0, i - kReach); k <= std::min(size - 1, i + kReach); ++k) {
+      const Quad& near = quads_[static_cast<size_t>(k)];
+      if (!near.is_edge || near.crosses_rows != q.crosses_rows ||
+          near.mean.odd_narrow * q.mean.odd_narrow < 0) {
+        continue;
+      }
+      sum.odd_narrow += near.mean.odd_narrow;
+      sum.even_narrow += near.mean.even_narrow;
+      sum.odd_wide += near.mean.odd_wide;
+      sum.even_wide += near.mean.even_wide;
+    }
+    const float odd_ratio = sum.odd_wide / sum.odd_narrow;
+    const float even_ratio =
+        (sum.even_wide - sum.even_narrow * odd_ratio) / sum.odd_narrow;
+    const double p = static_cast<double>(q.perpendicular);
+    const auto shift = bars_.shiftPx(blur_px2_ / (p * p), static_cast<double>(odd_ratio), std::abs(static_cast<double>(even_ratio)));
+    if (shift) shifts_[static_cast<size_t>(i)] = std::copysign(static_cast<float>(*shift), -even_ratio);
+  }
+  for (size_t i = 0; i < quads_.size(); ++i) {
+    quads_[i].offset_px += shifts_[i];
+    quads_[i].variance_px2 += kShare * kShare * shifts_[i] * shifts_[i];
+  }
+}
+
 /// Offsets for the last fit: with the gain that belongs to the edge's own blur; from the wide
 /// filters where the edge stands alone, which scatter less; measured again if the curve has moved
 /// far.
@@ -529,13 +653,14 @@ void LineTracer::refine() {
     sums.d += w * d;
     sums.td += w * t * d;
   }
-  if (!alone || !(sums.w > 0)) return;
+  alone = alone && sums.w > 0;
   // Neighbours move what the wider filter sees, as a whole or more and more along the line.
   constexpr double kSigmas2 = 9;
   const double trend2 = sums.tt - sums.t * sums.t / sums.w;
   const double trend = sums.td - sums.t * sums.d / sums.w;
-  if (sums.d * sums.d > kSigmas2 * sums.w || trend * trend > kSigmas2 * trend2 ||
+  if (!alone || sums.d * sums.d > kSigmas2 * sums.w || trend * trend > kSigmas2 * trend2 ||
       10 * differing > count) {
+    moveBarSides();
     return;
   }
   for (Quad& q : quads_) {
@@ -569,17 +694,7 @@ std::optional<TracedLine> LineTracer::trace(const PlanarPiece& piece,
   size_t count = 0;
   double level = 0, wide_level = 0;
   const auto probe = [&](uint32_t node) {
-    Front front;
-    front.position = nodes[piece.first_node + node].cast<double>();
-    // Eight rows around the node.
-    const RaySample sample = rays_.at(front.position.x(), front.position.y());
-    const Eigen::Vector2d g(sample.du.dot(normal_), sample.dv.dot(normal_));
-    const int a = std::abs(g.x()) >= std::abs(g.y()) ? 0 : 1;
-    if (!(std::abs(g[a]) > 0)) return;
-    front.position[a] -= sample.ray.dot(normal_) / g[a];
-    front.position[1 - a] -= 4;
-    front.position[a] += 4 * g[1 - a] / g[a];
-    if (!evaluate(&front, +1, &pair)) return;
+    if (!evaluateAround(nodes[piece.first_node + node], &pair)) return;
     for (const Quad& q : pair) {
       if (!q.is_edge) continue;
       probed[count++] = q;

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "cameras/ray_table.h"
+#include "detector/bar_profiles.h"
 #include "detector/edge_profile.h"
 #include "detector/options.h"
 #include "detector/planar_chain.h"
@@ -48,6 +49,9 @@ class LineTracer {
                 const BitRows& usable,
                 const BitRows& seen,
                 double min_contrast);
+  /// Measures the image's blur where its pieces show edges that stand alone.
+  void measureBlur(const std::vector<PlanarPiece>& pieces,
+                   const std::vector<Eigen::Vector2f>& nodes);
   [[nodiscard]] const ResponseNoise& noise() const { return noise_; }
 
   /// From the middle of the piece in both directions, four rows (columns) at a time. Four rows show
@@ -98,16 +102,20 @@ class LineTracer {
   void measureNoise();
   bool orient(Front* front) const;
   bool evaluate(Front* front, int direction, std::array<Quad, 2>* quads) const;
+  bool evaluateAround(const Eigen::Vector2f& px, std::array<Quad, 2>* quads) const;
   void judge(Quad* quad) const;
   [[nodiscard]] float sideOf(const Quad& quad) const;
   void add(const Quad& quad);
   void extend(int direction, Front* front);
   bool refit();
   void refine();
+  void moveBarSides();
   [[nodiscard]] bool isArc(const Eigen::Vector3d& normal) const;
   [[nodiscard]] double scoreOf() const;
   [[nodiscard]] int rowsOfEnd(size_t first, size_t last) const;
   [[nodiscard]] End endOf(size_t first, size_t last, bool at_border) const;
+  template <class Iterator>
+  [[nodiscard]] ptrdiff_t looseQuads(Iterator tip, Iterator other_end) const;
   bool cutEnds(Front* front, Front* back);
 
   const RayTable& rays_;
@@ -116,9 +124,12 @@ class LineTracer {
   EdgeProfiler profiler_;
   GreyPixels pixels_;
   ResponseNoise noise_;
+  const BarProfiles& bars_;
+  double blur_px2_ = 0;
   float min_odd_narrow_ = 0, min_odd_wide_ = 0;
 
   std::vector<Quad> quads_;
+  std::vector<float> shifts_;
   RayMoments moments_;
   Eigen::Vector3d normal_;
   bool wide_ = false;   // which filters judge

@@ -184,6 +184,7 @@ void PlaneDetector::detect(const ImageView& image,
   }
   const StopWatch stage(&times->validation);
   tracer_.setImage(pixels_, usable, seen, options_.edges.min_gradient / kGradientPerContrast);
+  tracer_.measureBlur(pieces_, splitter_.nodes());
   traceAll(lines);
 }
 

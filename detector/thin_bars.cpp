@@ -13,7 +13,7 @@ namespace dlsd {
 namespace {
 
 /// Nearer than this, two lines are one edge found twice, or cross.
-constexpr double kMinApartPx = 0.8;
+constexpr double kMinApartPx = -1;
 /// How much of the longer side must have a partner.
 constexpr double kMinCovered = 0.3;
 

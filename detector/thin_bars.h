@@ -20,7 +20,7 @@ class ThinBarMerger {
   void merge(std::vector<DetectedLine>* lines);
 
   /// A bar of true width 2 px seems 2.9 px wide through optical blur 0.7 px.
-  static constexpr double kMaxApartPx = 3.1;
+  static constexpr double kMaxApartPx = 2;
 
  private:
   struct Middle {

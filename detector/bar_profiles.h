@@ -1,0 +1,43 @@
+#pragma once
+// How far the sides of thin bars are from where they seem to be.
+
+#include <array>
+#include <optional>
+
+#include "detector/edge_profile.h"
+
+namespace dlsd {
+
+/// Through any blur, the sides of a bar (a step and, at a distance of some pixels, one of the
+/// opposite sign) push each other apart: those of a bar of width 0 seem 2.5 px apart at optical
+/// blur 0.7 px. Where one of them seems to be, the four responses tell how far.
+class BarProfiles {
+ public:
+  /// Tables from the filters' responses to steps: some milliseconds.
+  explicit BarProfiles(const EdgeProfiler& profiler);
+
+  /// Distance from where a side seems to be (even_narrow is 0 there) to where it is, along the row,
+  /// >= 0, towards the side on which even_wide / odd_narrow is the position of an isolated step...
+  /// of a bar of any width and any ratio of contrasts. No value if no bar looks like that.
+  /// @param blur_variance  Along the row, px^2; beyond the tables the nearest counts.
+  /// @param odd_ratio  odd_wide / odd_narrow there.
+  /// @param even_ratio  |even_wide / odd_narrow| there.
+  [[nodiscard]] std::optional<double> shiftPx(double blur_variance,
+                                              double odd_ratio,
+                                              double even_ratio) const;
+
+ private:
+  static constexpr std::array kVariances{0.15, 0.3, 0.45, 0.6, 0.8, 1.1, 1.5, 2.1, 3.0};
+  static constexpr double kLeastOdd = -2, kStep = 0.04;
+  static constexpr size_t kOdds = 77, kEvens = 130;
+  struct Node {
+    float shift_px, weight;
+  };
+  using Table = std::array<std::array<Node, kEvens>, kOdds>;
+
+  [[nodiscard]] std::optional<double> lookUp(const Table& table, double odd, double even) const;
+
+  std::array<Table, kVariances.size()> tables_{};
+};
+
+}  // namespace dlsd
