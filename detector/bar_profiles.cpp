@@ -101,7 +101,7 @@ BarProfiles::BarProfiles(const EdgeProfiler& profiler) {
       }
     }
     // What noise moves out of the band of true bars counts as the nearest of them.
-    for (int pass = 0; pass < 2; ++pass) {
+    for (int pass = 0; pass < 8; ++pass) {
       const Table before = table;
       for (size_t i = 0; i < kOdds; ++i) {
         for (size_t j = 0; j < kEvens; ++j) {
