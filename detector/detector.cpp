@@ -10,6 +10,7 @@
 #include "cameras/mutant.h"
 #include "cameras/ray_table.h"
 #include "detector/options.h"
+#include "detector/joints.h"
 #include "detector/paper_detector.h"
 #include "detector/plane_detector.h"
 #include "detector/stop_watch.h"
@@ -120,7 +121,10 @@ void Detector::Impl::run(const ImageView& image, const BitRows& where) {
     line.to_px = *to_px;
     return false;
   });
-  if (bars) bars->merge(&lines);
+  if (bars) {
+    bars->merge(&lines);
+    cutAtJoints(rays, &lines);
+  }
   std::sort(lines.begin(), lines.end(), [](const DetectedLine& a, const DetectedLine& b) {
     const auto position = [](const DetectedLine& l) {
       return std::make_tuple(l.from_px.x(), l.from_px.y(), l.to_px.x(), l.to_px.y());
