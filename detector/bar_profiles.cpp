@@ -21,8 +21,8 @@ class StepResponses {
     }
   }
   [[nodiscard]] EdgeResponse at(double position_px) const {
-    const double at =
-        std::clamp((position_px + kReachPx) * kPerPx, 0.0, static_cast<double>(kSamples - 1) - 1e-9);
+    const double at = std::clamp(
+        (position_px + kReachPx) * kPerPx, 0.0, static_cast<double>(kSamples - 1) - 1e-9);
     const auto i = static_cast<size_t>(at);
     const auto t = static_cast<float>(at - static_cast<double>(i));
     const EdgeResponse &a = samples_[i], &b = samples_[i + 1];
@@ -53,7 +53,8 @@ std::optional<double> positionOf(const StepResponses& steps, double width_px, fl
     const double position = -0.5 + static_cast<double>(i) / kPerPx;
     const EdgeResponse here = steps.ofBar(position, width_px, other);
     if (before.even_narrow < 0 && here.even_narrow >= 0 && here.odd_narrow > kLeastLevel) {
-      const auto t = static_cast<double>(before.even_narrow / (before.even_narrow - here.even_narrow));
+      const auto t =
+          static_cast<double>(before.even_narrow / (before.even_narrow - here.even_narrow));
       return position - (1 - t) / kPerPx;
     }
     before = here;

@@ -9,8 +9,8 @@
 
 #include "cameras/mutant.h"
 #include "cameras/ray_table.h"
-#include "detector/options.h"
 #include "detector/joints.h"
+#include "detector/options.h"
 #include "detector/paper_detector.h"
 #include "detector/plane_detector.h"
 #include "detector/stop_watch.h"

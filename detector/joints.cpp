@@ -40,7 +40,8 @@ bool crossingBefore(const RayTable& rays,
   if (at.dot(end_ray) < 0) at = -at;
   // On this line, not far from its end.
   const double its_way = n.dot(line.arc.from.cross(line.arc.to)) < 0 ? -1 : 1;
-  if (!(its_way * n.dot(line.arc.from.cross(at)) > 0 && its_way * n.dot(at.cross(line.arc.to)) > 0)) {
+  if (!(its_way * n.dot(line.arc.from.cross(at)) > 0 &&
+        its_way * n.dot(at.cross(line.arc.to)) > 0)) {
     return false;
   }
   if (pxBetween(at, end_ray, px_per_rad) > kMaxShare * line.length_px) return false;

@@ -10,8 +10,8 @@
 namespace dlsd {
 
 /// Cuts the end of a line where it crosses another one of the same polarity if beyond the crossing
-/// it stays within kSharedPx of the other line, which goes on and elsewhere departs from it. What is
-/// cut is less than a third of the line. from_px, to_px and length_px must be set, and are.
+/// it stays within kSharedPx of the other line, which goes on and elsewhere departs from it. What
+/// is cut is less than a third of the line. from_px, to_px and length_px must be set, and are.
 void cutAtJoints(const RayTable& rays, std::vector<DetectedLine>* lines);
 
 constexpr double kSharedPx = 1.5;

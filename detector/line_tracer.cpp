@@ -236,19 +236,24 @@ bool LineTracer::evaluateAround(const Eigen::Vector2f& px, std::array<Quad, 2>* 
   return evaluate(&front, +1, quads);
 }
 
+/// How edges are judged of which nothing is known yet.
+void LineTracer::forgetEdge() {
+  wide_ = false;
+  bound_px_ = widest_px_ = 1.5F;  // chains are whole pixels
+  drift_px_ = 0;
+  offset_gain_ = 1;
+}
+
 void LineTracer::measureBlur(const std::vector<PlanarPiece>& pieces,
                              const std::vector<Eigen::Vector2f>& nodes) {
   constexpr size_t kMaxPieces = 128;
-  constexpr float kLeastSigmas = 20;       // of the level; the ratio of levels is good to 5 %
-  constexpr float kMostEven = 0.15F;       // px between the offsets that the two filters see
+  constexpr float kLeastSigmas = 20;   // of the level: the ratio of levels is good to 5 %
+  constexpr float kMostApart = 0.15F;  // px between what the two filters see
   constexpr size_t kPrior = 3;
   std::array<double, kMaxPieces + kPrior> found;
   found.fill(kUsualVariance);
   size_t count = kPrior;
-  wide_ = false;
-  bound_px_ = widest_px_ = 1.5F;
-  drift_px_ = 0;
-  offset_gain_ = 1;
+  forgetEdge();
   const size_t stride = pieces.size() / kMaxPieces + 1;
   for (size_t i = 0; i < pieces.size(); i += stride) {
     const PlanarPiece& piece = pieces[i];
@@ -262,9 +267,9 @@ void LineTracer::measureBlur(const std::vector<PlanarPiece>& pieces,
         !(a.odd_narrow * b.odd_narrow > 0)) {
       continue;
     }
-    const float apart = (a.even_wide + b.even_wide) / wide_level -
-                        (a.even_narrow + b.even_narrow) / level;
-    if (!(std::abs(apart) <= kMostEven)) continue;
+    const float apart =
+        (a.even_wide + b.even_wide) / wide_level - (a.even_narrow + b.even_narrow) / level;
+    if (!(std::abs(apart) <= kMostApart)) continue;
     const auto ratio = static_cast<double>(level / wide_level);
     if (!(ratio <= profiler_.sharpestRatio() && ratio >= profiler_.softestRatio())) continue;
     const auto across = static_cast<double>(pair[0].perpendicular);
@@ -396,7 +401,9 @@ ptrdiff_t LineTracer::looseQuads(Iterator tip, Iterator other_end) const {
     if (at == other_end) return at - tip;
     const bool differs_here = differs(levelOf(*at));
     const bool rises = levelOf(*at) > 0;
-    const int min_run_px = differs_here ? kMinStrangeRunPx : (balance > 0) == rises ? kMinRunPx : kMinFlippedRunPx;
+    const int min_run_px = differs_here             ? kMinStrangeRunPx
+                           : (balance > 0) == rises ? kMinRunPx
+                                                    : kMinFlippedRunPx;
     Iterator behind = at;
     int run_px = 0;
     while (behind != other_end && behind->is_edge && run_px < min_run_px &&
@@ -546,19 +553,20 @@ LineTracer::End LineTracer::endOf(size_t first, size_t last, bool at_border) con
   return end;
 }
 
-/// The sides of a thin bar push each other apart: back to where they are.
+/// The sides of a thin bar push each other apart: back to where they are, by what the responses
+/// around each quad show.
 void LineTracer::moveBarSides() {
   // Responses are means over so many quads on both sides.
-  constexpr ptrdiff_t kReach = 4;
+  constexpr size_t kReach = 4;
   constexpr float kShare = 0.15F;  // of the shift, what may be wrong with it
-  const auto size = static_cast<ptrdiff_t>(quads_.size());
-  shifts_.assign(quads_.size(), 0);
-  for (ptrdiff_t i = 0; i < size; ++i) {
-    const Quad& q = quads_[static_cast<size_t>(i)];
+  shifts_px_.assign(quads_.size(), 0);
+  for (size_t i = 0; i < quads_.size(); ++i) {
+    const Quad& q = quads_[i];
     if (!q.is_edge) continue;
     EdgeResponse sum{};
-    for (ptrdiff_t k = std::max<ptrdiff_t>(0, i - kReach); k <= std::min(size - 1, i + kReach); ++k) {
-      const Quad& near = quads_[static_cast<size_t>(k)];
+    const size_t end = std::min(quads_.size(), i + kReach + 1);
+    for (size_t k = i - std::min(i, kReach); k < end; ++k) {
+      const Quad& near = quads_[k];
       if (!near.is_edge || near.crosses_rows != q.crosses_rows ||
           near.mean.odd_narrow * q.mean.odd_narrow < 0) {
         continue;
@@ -568,16 +576,20 @@ void LineTracer::moveBarSides() {
       sum.odd_wide += near.mean.odd_wide;
       sum.even_wide += near.mean.even_wide;
     }
-    const float odd_ratio = sum.odd_wide / sum.odd_narrow;
-    const float even_ratio =
-        (sum.even_wide - sum.even_narrow * odd_ratio) / sum.odd_narrow;
-    const double p = static_cast<double>(q.perpendicular);
-    const auto shift = bars_.shiftPx(blur_px2_ / (p * p), static_cast<double>(odd_ratio), std::abs(static_cast<double>(even_ratio)));
-    if (shift) shifts_[static_cast<size_t>(i)] = std::copysign(static_cast<float>(*shift), -even_ratio);
+    const auto narrow = static_cast<double>(sum.odd_narrow);
+    const double odd_ratio = static_cast<double>(sum.odd_wide) / narrow;
+    // Where the narrow filters see the edge, which may be beside the curve.
+    const double even_ratio =
+        (static_cast<double>(sum.even_wide) - static_cast<double>(sum.even_narrow) * odd_ratio) /
+        narrow;
+    const auto across = static_cast<double>(q.perpendicular);
+    const auto shift_px =
+        bars_.shiftPx(blur_px2_ / (across * across), odd_ratio, std::abs(even_ratio));
+    if (shift_px) shifts_px_[i] = static_cast<float>(std::copysign(*shift_px, -even_ratio));
   }
   for (size_t i = 0; i < quads_.size(); ++i) {
-    quads_[i].offset_px += shifts_[i];
-    quads_[i].variance_px2 += kShare * kShare * shifts_[i] * shifts_[i];
+    quads_[i].offset_px += shifts_px_[i];
+    quads_[i].variance_px2 += kShare * kShare * shifts_px_[i] * shifts_px_[i];
   }
 }
 
@@ -682,10 +694,7 @@ std::optional<TracedLine> LineTracer::trace(const PlanarPiece& piece,
   moments_ = {};
   points_ = points_at_fit_ = 0;
   angle_rad_ = 0;
-  wide_ = false;
-  bound_px_ = widest_px_ = 1.5F;  // chains are whole pixels
-  drift_px_ = 0;
-  offset_gain_ = 1;
+  forgetEdge();
 
   // The plane of the piece from a few of its rows: more of them if they scatter.
   constexpr uint32_t kProbes = 3;

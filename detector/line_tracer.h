@@ -109,6 +109,7 @@ class LineTracer {
   void extend(int direction, Front* front);
   bool refit();
   void refine();
+  void forgetEdge();
   void moveBarSides();
   [[nodiscard]] bool isArc(const Eigen::Vector3d& normal) const;
   [[nodiscard]] double scoreOf() const;
@@ -125,11 +126,11 @@ class LineTracer {
   GreyPixels pixels_;
   ResponseNoise noise_;
   const BarProfiles& bars_;
-  double blur_px2_ = 0;
+  double blur_px2_ = 0;  // variance across an edge that stands alone, optics and pixel
   float min_odd_narrow_ = 0, min_odd_wide_ = 0;
 
   std::vector<Quad> quads_;
-  std::vector<float> shifts_;
+  std::vector<float> shifts_px_;  // by quad, of the sides of bars
   RayMoments moments_;
   Eigen::Vector3d normal_;
   bool wide_ = false;   // which filters judge

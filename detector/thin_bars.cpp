@@ -12,7 +12,7 @@
 namespace dlsd {
 namespace {
 
-/// Nearer than this, two lines are one edge found twice, or cross.
+/// Where the width is hardly seen, the sides may even be taken for each other.
 constexpr double kMinApartPx = -1;
 /// How much of the longer side must have a partner.
 constexpr double kMinCovered = 0.3;

@@ -1,6 +1,6 @@
 #pragma once
-// Wires and other bars so thin that an image does not show their two sides where they are: through
-// any blur the sides of a bar seem at least 2 to 2.5 px apart. Each is one line, in its middle.
+// Wires and other bars so thin that an image tells little of their width: both sides are one line,
+// in their middle.
 
 #include <vector>
 
@@ -19,7 +19,7 @@ class ThinBarMerger {
   /// one's polarity, score, residuals and covariance. from_px and to_px must be set, and are.
   void merge(std::vector<DetectedLine>* lines);
 
-  /// A bar of true width 2 px seems 2.9 px wide through optical blur 0.7 px.
+  /// The middle is within 1 px of both sides. (Where the sides are: BarProfiles.)
   static constexpr double kMaxApartPx = 2;
 
  private:
