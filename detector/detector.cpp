@@ -82,6 +82,7 @@ struct Detector::Impl {
     } else {
       planes.emplace(rays, the_options);
       bars.emplace(rays);
+      joints.emplace(rays);
     }
   }
 
@@ -93,6 +94,7 @@ struct Detector::Impl {
   std::optional<PaperDetector> paper;
   std::optional<PlaneDetector> planes;
   std::optional<ThinBarMerger> bars;
+  std::optional<JointCutter> joints;
   std::vector<DetectedLine> lines;
   StageTimes times;
 };
@@ -123,7 +125,7 @@ void Detector::Impl::run(const ImageView& image, const BitRows& where) {
   });
   if (bars) {
     bars->merge(&lines);
-    cutAtJoints(rays, &lines);
+    joints->cut(&lines);
   }
   std::sort(lines.begin(), lines.end(), [](const DetectedLine& a, const DetectedLine& b) {
     const auto position = [](const DetectedLine& l) {

@@ -17,13 +17,14 @@ double pxBetween(const Eigen::Vector3d& a, const Eigen::Vector3d& b, double px_p
   return (a - b).norm() * px_per_rad;
 }
 
-/// The crossing at which `line` is cut if its end `end_ray` belongs to `other`; false if not.
-bool crossingBefore(const RayTable& rays,
-                    const DetectedLine& line,
-                    const Eigen::Vector3d& end_ray,
-                    const Eigen::Vector2d& end_px,
-                    const DetectedLine& other,
-                    Eigen::Vector3d* crossing) {
+}  // namespace
+
+/// Where `line` is cut if its end belongs to `other`, whose plane is near; false if it does not.
+bool JointCutter::crossingBefore(const DetectedLine& line,
+                                 const Eigen::Vector3d& end_ray,
+                                 double px_per_rad,
+                                 const DetectedLine& other,
+                                 Eigen::Vector3d* crossing) const {
   const Eigen::Vector3d &n = line.arc.normal, &m = other.arc.normal;
   const double same_way = n.dot(m) < 0 ? -1 : 1;
   if (same_way * line.polarity * other.polarity < 0) return false;
@@ -31,9 +32,7 @@ bool crossingBefore(const RayTable& rays,
   const double way = m.dot(other.arc.from.cross(other.arc.to)) < 0 ? -1 : 1;
   const bool is_beside = way * m.dot(other.arc.from.cross(end_ray)) > 0 &&
                          way * m.dot(end_ray.cross(other.arc.to)) > 0;
-  if (!is_beside || !rays.covers(end_px.x(), end_px.y())) return false;
-  const double px_per_rad = rays.at(end_px.x(), end_px.y()).pxPerRad();
-  if (std::abs(end_ray.dot(m)) * px_per_rad > kSharedPx) return false;
+  if (!is_beside) return false;
   Eigen::Vector3d at = n.cross(m);
   if (!(at.norm() > 0)) return false;
   at.normalize();
@@ -59,17 +58,37 @@ bool crossingBefore(const RayTable& rays,
   return true;
 }
 
-}  // namespace
-
-void cutAtJoints(const RayTable& rays, std::vector<DetectedLine>* lines) {
-  const Camera& camera = rays.camera();
-  for (DetectedLine& line : *lines) {
+void JointCutter::cut(std::vector<DetectedLine>* lines) {
+  const Camera& camera = rays_.camera();
+  const size_t count = lines->size();
+  for (size_t axis = 0; axis < 3; ++axis) {
+    normals_[axis].resize(count);
+    for (size_t i = 0; i < count; ++i) {
+      normals_[axis][i] = static_cast<float>((*lines)[i].arc.normal[static_cast<int>(axis)]);
+    }
+  }
+  is_near_.resize(count);
+  for (size_t i = 0; i < count; ++i) {
+    DetectedLine& line = (*lines)[i];
     for (const bool at_from : {true, false}) {
-      for (const DetectedLine& other : *lines) {
-        Eigen::Vector3d& ray = at_from ? line.arc.from : line.arc.to;
-        Eigen::Vector2d& px = at_from ? line.from_px : line.to_px;
+      Eigen::Vector3d& ray = at_from ? line.arc.from : line.arc.to;
+      Eigen::Vector2d& px = at_from ? line.from_px : line.to_px;
+      if (!rays_.covers(px.x(), px.y())) continue;
+      const double px_per_rad = rays_.at(px.x(), px.y()).pxPerRad();
+      if (!(px_per_rad > 0)) continue;
+      const Eigen::Vector3f at = ray.cast<float>();
+      const float bound_rad = static_cast<float>(kSharedPx / px_per_rad);
+      for (size_t k = 0; k < count; ++k) {
+        const float distance =
+            normals_[0][k] * at.x() + normals_[1][k] * at.y() + normals_[2][k] * at.z();
+        is_near_[k] = std::abs(distance) <= bound_rad;
+      }
+      is_near_[i] = 0;
+      for (size_t k = 0; k < count; ++k) {
         Eigen::Vector3d crossing;
-        if (&other == &line || !crossingBefore(rays, line, ray, px, other, &crossing)) continue;
+        if (is_near_[k] == 0 || !crossingBefore(line, ray, px_per_rad, (*lines)[k], &crossing)) {
+          continue;
+        }
         const auto crossing_px = camera.project(crossing);
         if (!crossing_px || !camera.inImage(*crossing_px)) continue;
         line.length_px = std::max(0.0, line.length_px - (*crossing_px - px).norm());
