@@ -3,6 +3,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace dlsd {
 namespace {
@@ -61,13 +62,14 @@ bool JointCutter::crossingBefore(const DetectedLine& line,
 void JointCutter::cut(std::vector<DetectedLine>* lines) {
   const Camera& camera = rays_.camera();
   const size_t count = lines->size();
+  constexpr size_t kBlock = 16;
   for (size_t axis = 0; axis < 3; ++axis) {
-    normals_[axis].resize(count);
+    // Whole blocks.
+    normals_[axis].assign((count / kBlock + 1) * kBlock, 0);
     for (size_t i = 0; i < count; ++i) {
       normals_[axis][i] = static_cast<float>((*lines)[i].arc.normal[static_cast<int>(axis)]);
     }
   }
-  is_near_.resize(count);
   for (size_t i = 0; i < count; ++i) {
     DetectedLine& line = (*lines)[i];
     for (const bool at_from : {true, false}) {
@@ -78,15 +80,25 @@ void JointCutter::cut(std::vector<DetectedLine>* lines) {
       if (!(px_per_rad > 0)) continue;
       const Eigen::Vector3f at = ray.cast<float>();
       const float bound_rad = static_cast<float>(kSharedPx / px_per_rad);
+      // Most of the others are far away: a block of them is passed at once.
       for (size_t k = 0; k < count; ++k) {
+        if (k % kBlock == 0) {
+          float least = std::numeric_limits<float>::max();
+          for (size_t j = k; j < k + kBlock; ++j) {
+            least = std::min(least,
+                             std::abs(normals_[0][j] * at.x() + normals_[1][j] * at.y() +
+                                      normals_[2][j] * at.z()));
+          }
+          if (!(least <= bound_rad)) {
+            k += kBlock - 1;
+            continue;
+          }
+        }
         const float distance =
             normals_[0][k] * at.x() + normals_[1][k] * at.y() + normals_[2][k] * at.z();
-        is_near_[k] = std::abs(distance) <= bound_rad;
-      }
-      is_near_[i] = 0;
-      for (size_t k = 0; k < count; ++k) {
         Eigen::Vector3d crossing;
-        if (is_near_[k] == 0 || !crossingBefore(line, ray, px_per_rad, (*lines)[k], &crossing)) {
+        if (k == i || !(std::abs(distance) <= bound_rad) ||
+            !crossingBefore(line, ray, px_per_rad, (*lines)[k], &crossing)) {
           continue;
         }
         const auto crossing_px = camera.project(crossing);

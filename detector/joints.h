@@ -3,7 +3,6 @@
 // other one for a while.
 
 #include <array>
-#include <cstdint>
 #include <vector>
 
 #include "cameras/ray_table.h"
@@ -32,7 +31,6 @@ class JointCutter {
 
   const RayTable& rays_;
   std::array<std::vector<float>, 3> normals_;  // by axis
-  std::vector<uint8_t> is_near_;
 };
 
 }  // namespace dlsd

@@ -556,40 +556,40 @@ LineTracer::End LineTracer::endOf(size_t first, size_t last, bool at_border) con
 /// The sides of a thin bar push each other apart: back to where they are, by what the responses
 /// around each quad show.
 void LineTracer::moveBarSides() {
-  // Responses are means over so many quads on both sides.
-  constexpr size_t kReach = 4;
+  // For so many quads at a time, from them and as many on both sides together.
+  constexpr size_t kBlock = 3;
   constexpr float kShare = 0.15F;  // of the shift, what may be wrong with it
-  shifts_px_.assign(quads_.size(), 0);
-  for (size_t i = 0; i < quads_.size(); ++i) {
-    const Quad& q = quads_[i];
-    if (!q.is_edge) continue;
+  for (size_t begin = 0; begin < quads_.size(); begin += kBlock) {
+    const size_t end = std::min(quads_.size(), begin + kBlock);
+    const Quad& middle = quads_[(begin + end) / 2];
     EdgeResponse sum{};
-    const size_t end = std::min(quads_.size(), i + kReach + 1);
-    for (size_t k = i - std::min(i, kReach); k < end; ++k) {
-      const Quad& near = quads_[k];
-      if (!near.is_edge || near.crosses_rows != q.crosses_rows ||
-          near.mean.odd_narrow * q.mean.odd_narrow < 0) {
-        continue;
-      }
-      sum.odd_narrow += near.mean.odd_narrow;
-      sum.even_narrow += near.mean.even_narrow;
-      sum.odd_wide += near.mean.odd_wide;
-      sum.even_wide += near.mean.even_wide;
+    for (size_t k = begin - std::min(begin, kBlock); k < std::min(quads_.size(), end + kBlock);
+         ++k) {
+      const Quad& q = quads_[k];
+      if (!q.is_edge || q.crosses_rows != middle.crosses_rows) continue;
+      // Where the polarity changes, all four turn round.
+      const float sign = q.mean.odd_narrow < 0 ? -1 : 1;
+      sum.odd_narrow += sign * q.mean.odd_narrow;
+      sum.even_narrow += sign * q.mean.even_narrow;
+      sum.odd_wide += sign * q.mean.odd_wide;
+      sum.even_wide += sign * q.mean.even_wide;
     }
+    if (!(sum.odd_narrow > 0)) continue;
     const auto narrow = static_cast<double>(sum.odd_narrow);
     const double odd_ratio = static_cast<double>(sum.odd_wide) / narrow;
     // Where the narrow filters see the edge, which may be beside the curve.
     const double even_ratio =
         (static_cast<double>(sum.even_wide) - static_cast<double>(sum.even_narrow) * odd_ratio) /
         narrow;
-    const auto across = static_cast<double>(q.perpendicular);
+    const auto across = static_cast<double>(middle.perpendicular);
     const auto shift_px =
         bars_.shiftPx(blur_px2_ / (across * across), odd_ratio, std::abs(even_ratio));
-    if (shift_px) shifts_px_[i] = static_cast<float>(std::copysign(*shift_px, -even_ratio));
-  }
-  for (size_t i = 0; i < quads_.size(); ++i) {
-    quads_[i].offset_px += shifts_px_[i];
-    quads_[i].variance_px2 += kShare * kShare * shifts_px_[i] * shifts_px_[i];
+    if (!shift_px) continue;
+    const auto shift = static_cast<float>(std::copysign(*shift_px, -even_ratio));
+    for (size_t k = begin; k < end; ++k) {
+      quads_[k].offset_px += shift;
+      quads_[k].variance_px2 += kShare * kShare * shift * shift;
+    }
   }
 }
 

@@ -130,7 +130,6 @@ class LineTracer {
   float min_odd_narrow_ = 0, min_odd_wide_ = 0;
 
   std::vector<Quad> quads_;
-  std::vector<float> shifts_px_;  // by quad, of the sides of bars
   RayMoments moments_;
   Eigen::Vector3d normal_;
   bool wide_ = false;   // which filters judge
