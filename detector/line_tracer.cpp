@@ -171,7 +171,7 @@ bool LineTracer::evaluate(Front* front, int direction, std::array<Quad, 2>* quad
     sample.ray += (at.x() - u) * sample.du + (at.y() - v) * sample.dv;
     sample.ray += step * (a == 0 ? sample.du : sample.dv);
     at[a] += step;
-    if (std::abs(step) < 0.05) break;
+    if (std::abs(step) < 0.5) break;
   }
   const double slope = -g[1 - a] / g[a];
   const double bend = (slope - front->slope) / ahead;
