@@ -22,9 +22,9 @@ namespace dlsd {
 
 struct DetectorOptions;  // detector/options.h
 
-/// A straight 3D line seen in the image. A wire, or another bar so thin that the image does not show
-/// its two sides apart (they seem at most 3.1 px apart: true widths up to about 2 px), is one line
-/// in its middle; its residuals, score and polarity are those of the longer of its two sides.
+/// A straight 3D line seen in the image. A wire, or another bar so thin that the image does not
+/// show its two sides apart (they seem at most 3.1 px apart: true widths up to about 2 px), is one
+/// line in its middle; its residuals, score and polarity are those of the longer of its two sides.
 struct DetectedLine {
   /// Fitted plane and end rays, camera frame. Less than half a turn, its image curve inside the
   /// image and the domain.
@@ -34,7 +34,9 @@ struct DetectedLine {
   double rms_px = 0, max_px = 0;   ///< Reprojection residuals (paper's Eq. 8) of the edge pixels.
   double length_px = 0;            ///< Length along the image curve.
   double score = 0;                ///< -log10 of the number of false alarms; larger is better.
-  int polarity = 1;                ///< +1: brighter on the side arc.normal points to, else -1.
+  double contrast = 0;  ///< Mean step across the line, grey levels: that of an edge which
+                        ///< stands alone, less beside another one. 0 for paper().
+  int polarity = 1;     ///< +1: brighter on the side arc.normal points to, else -1.
 };
 
 /// Seconds spent in each step of the last detect() call.

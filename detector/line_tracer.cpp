@@ -781,6 +781,7 @@ std::optional<TracedLine> LineTracer::trace(const PlanarPiece& piece,
   if (!(wide <= static_cast<double>(kMaxWideRatio) * narrow)) return std::nullopt;
   TracedLine line{};
   line.score = scoreOf();
+  line.contrast = narrow / static_cast<double>(quads_.size());
   if (!(line.score >= options_.min_score)) return std::nullopt;
   refine();
   if (!cutEnds(&front, &back)) return std::nullopt;

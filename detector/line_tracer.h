@@ -25,9 +25,10 @@ struct TracedLine {
   Eigen::Vector3d middle_ray;        ///< Of a point between them: tells which way round.
   double length_px;                  ///< Along the curve.
   double rms_px, max_px;             ///< Distances of the edge points from the curve.
-  bool is_inside;  ///< All of it is well inside the image: neither end is at the border or rim.
-  bool is_arc;     ///< Bends with a radius below min_bend_radius_px.
-  int polarity;    ///< +1: brighter on the side fit.normal points to.
+  bool is_inside;   ///< All of it is well inside the image: neither end is at the border or rim.
+  bool is_arc;      ///< Bends with a radius below min_bend_radius_px.
+  double contrast;  ///< Mean of the narrow filter's response, grey levels.
+  int polarity;     ///< +1: brighter on the side fit.normal points to.
   double score;
 };
 

@@ -159,6 +159,7 @@ void PlaneDetector::trace(const PlanarPiece& piece, std::vector<DetectedLine>* l
   line.max_px = traced->max_px;
   line.length_px = traced->length_px;
   line.score = traced->score;
+  line.contrast = traced->contrast;
   line.polarity = DLSD_MUTANT("polarity") ? 1 : traced->polarity;
   line.normal_cov = traced->fit.inverse_in_plane * (DLSD_MUTANT("line-covariance") ? 0.25 : 1) *
                     traced->variance_factor;

@@ -14,6 +14,8 @@ namespace {
 
 /// Where the width is hardly seen, the sides may even be taken for each other.
 constexpr double kMinApartPx = -1;
+/// Of the contrasts of both sides, if the ground is even.
+constexpr double kEvenRatio = 0.8;
 /// How much of the longer side must have a partner.
 constexpr double kMinCovered = 0.3;
 
@@ -35,16 +37,18 @@ bool ThinBarMerger::isBeside(const DetectedLine& line,
   if ((same_way * line.polarity * of.polarity > 0 && !DLSD_MUTANT("bar-polarity")) ||
       !isBesideArc(of.arc, middle.ray))
     return false;
+  const auto [fainter, stronger] = std::minmax(line.contrast, of.contrast);
+  const double max_apart_px = fainter > kEvenRatio * stronger ? kMaxEvenApartPx : kMaxApartPx;
   const double at_middle =
       curveOffset(rays_.at(middle.px.x(), middle.px.y()), of.arc.normal).offset_px;
   for (const Eigen::Vector2d& px : {line.from_px, line.to_px}) {
     if (!rays_.covers(px.x(), px.y())) return false;
     const double offset = curveOffset(rays_.at(px.x(), px.y()), of.arc.normal).offset_px;
     const double outwards = at_middle < 0 ? -offset : offset;
-    if (!(outwards >= kMinApartPx && outwards <= kMaxApartPx)) return false;
+    if (!(outwards >= kMinApartPx && outwards <= max_apart_px)) return false;
   }
   *offset_px = at_middle;
-  return std::abs(at_middle) >= kMinApartPx && std::abs(at_middle) <= kMaxApartPx;
+  return std::abs(at_middle) >= kMinApartPx && std::abs(at_middle) <= max_apart_px;
 }
 
 /// Moves a line half way to its partners; false (and unchanged) if that gives no line.
@@ -145,7 +149,7 @@ void ThinBarMerger::merge(std::vector<DetectedLine>* lines) {
       const Middle& middle = middles_[i];
       const double apart_px = std::abs(middle.ray.dot(line.arc.normal)) * middle.px_per_rad;
       // Pixels differ in size across and along a line: twice the bound is certainly too far.
-      if (apart_px > 2 * kMaxApartPx || gone_[i] != 0 || middle.px_per_rad == 0) continue;
+      if (apart_px > 2 * kMaxEvenApartPx || gone_[i] != 0 || middle.px_per_rad == 0) continue;
       double offset_px = 0;
       if (!isBeside((*lines)[i], middle, line, &offset_px)) continue;
       (offset_px < 0 ? left_ : right_).push_back(i);

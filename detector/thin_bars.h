@@ -13,14 +13,17 @@ class ThinBarMerger {
  public:
   explicit ThinBarMerger(const RayTable& rays) : rays_(rays) {}
 
-  /// Two lines of opposite polarity that run at most kMaxApartPx apart beside each other (the
-  /// shorter side, in pieces or not, along at least three tenths of the longer one) become one in
-  /// the middle between them, from the first to the last of the four ends. It keeps the longer
-  /// one's polarity, score, residuals and covariance. from_px and to_px must be set, and are.
+  /// Two lines of opposite polarity that run at most kMaxApartPx (kMaxEvenApartPx) apart beside
+  /// each other (the shorter side, in pieces or not, along at least three tenths of the longer one)
+  /// become one in the middle between them, from the first to the last of the four ends. It keeps
+  /// the longer one's polarity, score, residuals and covariance. from_px and to_px must be set, and
+  /// are.
   void merge(std::vector<DetectedLine>* lines);
 
   /// The middle is within 1 px of both sides. (Where the sides are: BarProfiles.)
   static constexpr double kMaxApartPx = 2;
+  /// Where both sides have the same contrast, as those of a rod or wire in front of something have.
+  static constexpr double kMaxEvenApartPx = 2.5;
 
  private:
   struct Middle {
