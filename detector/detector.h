@@ -22,9 +22,9 @@ namespace dlsd {
 
 struct DetectorOptions;  // detector/options.h
 
-/// A straight 3D line seen in the image. A wire, or another bar so thin that the image does not
-/// show its two sides apart (they seem at most 3.1 px apart: true widths up to about 2 px), is one
-/// line in its middle; its residuals, score and polarity are those of the longer of its two sides.
+/// A straight 3D line seen in the image. A wire, or another bar of at most about 2 px (2.5 px on even
+/// ground), is one line in its middle; its residuals, score and polarity are those of the longer of
+/// its two sides. The sides of wider bars are lines where they are, not where blur makes them seem.
 struct DetectedLine {
   /// Fitted plane and end rays, camera frame. Less than half a turn, its image curve inside the
   /// image and the domain.

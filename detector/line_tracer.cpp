@@ -585,7 +585,10 @@ void LineTracer::moveBarSides() {
     const auto shift_px =
         bars_.shiftPx(blur_px2_ / (across * across), odd_ratio, std::abs(even_ratio));
     if (!shift_px) continue;
-    const auto shift = static_cast<float>(std::copysign(*shift_px, -even_ratio));
+    // An edge of another blur than assumed looks like a bar that is hardly there.
+    constexpr double kLeastEven = 0.1, kFadeEven = 0.2;
+    const double fade = std::clamp((std::abs(even_ratio) - kLeastEven) / kFadeEven, 0.0, 1.0);
+    const auto shift = static_cast<float>(std::copysign(fade * *shift_px, -even_ratio));
     for (size_t k = begin; k < end; ++k) {
       quads_[k].offset_px += shift;
       quads_[k].variance_px2 += kShare * kShare * shift * shift;
