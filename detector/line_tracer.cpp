@@ -563,6 +563,7 @@ void LineTracer::moveBarSides() {
     const size_t end = std::min(quads_.size(), begin + kBlock);
     const Quad& middle = quads_[(begin + end) / 2];
     EdgeResponse sum{};
+    int count = 0;
     for (size_t k = begin - std::min(begin, kBlock); k < std::min(quads_.size(), end + kBlock);
          ++k) {
       const Quad& q = quads_[k];
@@ -573,6 +574,7 @@ void LineTracer::moveBarSides() {
       sum.even_narrow += sign * q.mean.even_narrow;
       sum.odd_wide += sign * q.mean.odd_wide;
       sum.even_wide += sign * q.mean.even_wide;
+      ++count;
     }
     if (!(sum.odd_narrow > 0)) continue;
     const auto narrow = static_cast<double>(sum.odd_narrow);
@@ -585,9 +587,11 @@ void LineTracer::moveBarSides() {
     const auto shift_px =
         bars_.shiftPx(blur_px2_ / (across * across), odd_ratio, std::abs(even_ratio));
     if (!shift_px) continue;
-    // An edge of another blur than assumed looks like a bar that is hardly there.
-    constexpr double kLeastEven = 0.1, kFadeEven = 0.2;
-    const double fade = std::clamp((std::abs(even_ratio) - kLeastEven) / kFadeEven, 0.0, 1.0);
+    // An edge of another blur than assumed looks like a bar that is hardly there, as does noise.
+    constexpr double kLeastEven = 0.1, kFadeEven = 0.2, kSigmas = 3;
+    const double sigma = static_cast<double>(noise_.even_wide) * std::sqrt(count) / narrow;
+    const double beyond = std::abs(even_ratio) - std::max(kLeastEven, kSigmas * sigma);
+    const double fade = std::clamp(beyond / kFadeEven, 0.0, 1.0);
     const auto shift = static_cast<float>(std::copysign(fade * *shift_px, -even_ratio));
     for (size_t k = begin; k < end; ++k) {
       quads_[k].offset_px += shift;
