@@ -396,8 +396,12 @@ ptrdiff_t LineTracer::looseQuads(Iterator tip, Iterator other_end) const {
     return std::abs(l) < kFaintLevel * level || kFaintLevel * std::abs(l) > level;
   };
   Iterator at = tip;
+  ptrdiff_t shared = 0;  // quads before `at` of which the line may hold a part
   for (;;) {
-    while (at != other_end && !at->is_edge) ++at;
+    while (at != other_end && !at->is_edge) {
+      ++at;
+      shared = 0;
+    }
     if (at == other_end) return at - tip;
     const bool differs_here = differs(levelOf(*at));
     const bool rises = levelOf(*at) > 0;
@@ -411,7 +415,8 @@ ptrdiff_t LineTracer::looseQuads(Iterator tip, Iterator other_end) const {
       run_px += kQuadPx;
       ++behind;
     }
-    if (behind == other_end || run_px >= min_run_px) return at - tip;
+    if (behind == other_end || run_px >= min_run_px) return at - tip - shared;
+    shared = behind->is_edge && (levelOf(*behind) > 0) == rises ? 1 : 0;
     at = behind;
   }
 }
