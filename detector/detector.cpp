@@ -126,6 +126,7 @@ void Detector::Impl::run(const ImageView& image, const BitRows& where) {
   if (bars) {
     bars->merge(&lines);
     joints->cut(&lines);
+    joints->meetAtCorners(&lines);
   }
   std::sort(lines.begin(), lines.end(), [](const DetectedLine& a, const DetectedLine& b) {
     const auto position = [](const DetectedLine& l) {

@@ -4,6 +4,9 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <tuple>
+
+#include "detector/plane_curve.h"
 
 namespace dlsd {
 namespace {
@@ -13,6 +16,8 @@ constexpr double kGoesOnPx = 8, kDepartsPx = 2.5;
 /// How far from the crossing the other line may begin.
 constexpr double kGapPx = 12;
 constexpr double kMaxShare = 1.0 / 3;
+/// Of the angle between the edges of a corner.
+constexpr double kCosLeastAngle = 0.966;
 
 double pxBetween(const Eigen::Vector3d& a, const Eigen::Vector3d& b, double px_per_rad) {
   return (a - b).norm() * px_per_rad;
@@ -108,6 +113,77 @@ void JointCutter::cut(std::vector<DetectedLine>* lines) {
         px = *crossing_px;
       }
     }
+  }
+}
+
+/// Tells two ends of the corner between them, if there is one.
+void JointCutter::offerCorner(const std::vector<DetectedLine>& lines, Tip* a, Tip* b) const {
+  const Eigen::Vector3d &n = lines[a->line].arc.normal, &m = lines[b->line].arc.normal;
+  Eigen::Vector3d corner = n.cross(m);
+  if (!(corner.norm() > 0)) return;
+  corner.normalize();
+  // Between the edges of a corner it is brighter than beyond both, or darker.
+  const auto farEnd = [&](const Tip& tip) -> const Eigen::Vector3d& {
+    return tip.at_from ? lines[tip.line].arc.to : lines[tip.line].arc.from;
+  };
+  const double towards_b = lines[a->line].polarity * n.dot(farEnd(*b));
+  const double towards_a = lines[b->line].polarity * m.dot(farEnd(*a));
+  if (!(towards_a * towards_b > 0)) return;
+  if (corner.dot(a->at_from ? lines[a->line].arc.from : lines[a->line].arc.to) < 0) {
+    corner = -corner;
+  }
+  const auto px = rays_.camera().project(corner);
+  if (!px || !rays_.covers(px->x(), px->y())) return;
+  const double from_a = (*px - a->px).norm(), from_b = (*px - b->px).norm();
+  if (!(std::max(from_a, from_b) <= kCornerPx)) return;
+  const RaySample sample = rays_.at(px->x(), px->y());
+  const Eigen::Vector2d across_a = curveOffset(sample, n).normal;
+  const Eigen::Vector2d across_b = curveOffset(sample, m).normal;
+  if (std::abs(across_a.dot(across_b)) > kCosLeastAngle) return;
+  for (const auto& [tip, distance] : {std::pair(a, from_a), std::pair(b, from_b)}) {
+    if (distance >= tip->nearest_px) continue;
+    tip->nearest_px = distance;
+    tip->corner_px = *px;
+    tip->corner_ray = corner;
+  }
+}
+
+void JointCutter::meetAtCorners(std::vector<DetectedLine>* lines) {
+  const Camera& camera = rays_.camera();
+  // What ends at the border goes on.
+  constexpr double kBorderPx = 2;
+  tips_.clear();
+  for (size_t i = 0; i < lines->size(); ++i) {
+    for (const bool at_from : {true, false}) {
+      const Eigen::Vector2d& px = at_from ? (*lines)[i].from_px : (*lines)[i].to_px;
+      if (std::min({px.x(), px.y(), camera.width() - 1 - px.x(), camera.height() - 1 - px.y()}) <
+          kBorderPx) {
+        continue;
+      }
+      tips_.push_back({i, at_from, px, px, Eigen::Vector3d::Zero(), 2 * kCornerPx});
+    }
+  }
+  std::sort(tips_.begin(), tips_.end(), [](const Tip& a, const Tip& b) {
+    return std::make_tuple(a.px.x(), a.px.y(), a.line) <
+           std::make_tuple(b.px.x(), b.px.y(), b.line);
+  });
+  for (size_t i = 0; i < tips_.size(); ++i) {
+    for (size_t k = i + 1; k < tips_.size(); ++k) {
+      const Eigen::Vector2d apart = tips_[k].px - tips_[i].px;
+      if (apart.x() > 2 * kCornerPx) break;
+      if (std::abs(apart.y()) > 2 * kCornerPx || tips_[k].line == tips_[i].line) continue;
+      offerCorner(*lines, &tips_[i], &tips_[k]);
+    }
+  }
+  for (const Tip& tip : tips_) {
+    if (!(tip.nearest_px <= kCornerPx)) continue;
+    DetectedLine& line = (*lines)[tip.line];
+    const Eigen::Vector2d& other_px = tip.at_from ? line.to_px : line.from_px;
+    const double longer_px = (tip.corner_px - other_px).norm() - (tip.px - other_px).norm();
+    if (!(line.length_px + longer_px > kCornerPx)) continue;
+    line.length_px += longer_px;
+    (tip.at_from ? line.from_px : line.to_px) = tip.corner_px;
+    (tip.at_from ? line.arc.from : line.arc.to) = tip.corner_ray;
   }
 }
 

@@ -20,9 +20,25 @@ class JointCutter {
   /// and are.
   void cut(std::vector<DetectedLine>* lines);
 
-  static constexpr double kSharedPx = 1.5;
+  static constexpr double kSharedPx = 1.9;
+
+  /// Near a corner neither of its edges looks like one: the ends of two lines that both are within
+  /// kCornerPx of where the lines cross, by 15 degrees or more, become that crossing. The same must
+  /// be set.
+  void meetAtCorners(std::vector<DetectedLine>* lines);
+
+  static constexpr double kCornerPx = 7.5;
 
  private:
+  struct Tip {
+    size_t line;
+    bool at_from;
+    Eigen::Vector2d px;
+    Eigen::Vector2d corner_px;  // the nearest so far ...
+    Eigen::Vector3d corner_ray;
+    double nearest_px;  // ... which is so far away
+  };
+  void offerCorner(const std::vector<DetectedLine>& lines, Tip* a, Tip* b) const;
   [[nodiscard]] bool crossingBefore(const DetectedLine& line,
                                     const Eigen::Vector3d& end_ray,
                                     double px_per_rad,
@@ -31,6 +47,7 @@ class JointCutter {
 
   const RayTable& rays_;
   std::array<std::vector<float>, 3> normals_;  // by axis
+  std::vector<Tip> tips_;
 };
 
 }  // namespace dlsd

@@ -9,7 +9,7 @@ namespace {
 
 /// A 3D line subtends less than pi. What goes on (a horizon) is cut here; the rest is a line of its
 /// own.
-constexpr double kMaxAngleRad = 3.1;
+constexpr double kMaxAngleRad = 3.02;
 /// Rows that cross the curve, until it has turned this far beyond 45 degrees.
 constexpr double kTurnRatio = 1.25;
 /// Widest angle between an edge and the curve: tan(pi / 10).
