@@ -5,6 +5,8 @@
 #include <tuple>
 #include <vector>
 
+#include "cameras/mutant.h"
+
 namespace dlsd {
 namespace {
 
@@ -152,7 +154,7 @@ std::optional<double> BarProfiles::shiftPx(double blur_variance,
   const auto a = lookUp(tables_[i], odd_ratio, even_ratio);
   const auto b = lookUp(tables_[i + 1], odd_ratio, even_ratio);
   if (!a || !b) return a ? a : b;
-  return *a + t * (*b - *a);
+  return (DLSD_MUTANT("bar-shift") ? 0.5 : 1) * (*a + t * (*b - *a));
 }
 
 }  // namespace dlsd

@@ -8,6 +8,8 @@
 
 #include "detector/plane_curve.h"
 
+#include "cameras/mutant.h"
+
 namespace dlsd {
 namespace {
 
@@ -33,7 +35,9 @@ bool JointCutter::crossingBefore(const DetectedLine& line,
                                  Eigen::Vector3d* crossing) const {
   const Eigen::Vector3d &n = line.arc.normal, &m = other.arc.normal;
   const double same_way = n.dot(m) < 0 ? -1 : 1;
-  if (same_way * line.polarity * other.polarity < 0) return false;
+  if (same_way * line.polarity * other.polarity < 0 && !DLSD_MUTANT("joint-polarity")) {
+    return false;
+  }
   // On the other arc, which goes on beyond.
   const double way = m.dot(other.arc.from.cross(other.arc.to)) < 0 ? -1 : 1;
   const bool is_beside = way * m.dot(other.arc.from.cross(end_ray)) > 0 &&

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "cameras/mutant.h"
+
 namespace dlsd {
 namespace {
 
@@ -355,7 +357,7 @@ void LineTracer::extend(int direction, Front* front) {
         break;
       }
       const double step_rad = last_ray.isZero() ? 0 : (q.ray - last_ray).norm();
-      if (angle_rad_ + step_rad > kMaxAngleRad) {
+      if (angle_rad_ + step_rad > (DLSD_MUTANT("half-turn") ? 4 : kMaxAngleRad)) {
         front->ended = true;
         break;
       }
@@ -405,9 +407,9 @@ ptrdiff_t LineTracer::looseQuads(Iterator tip, Iterator other_end) const {
     if (at == other_end) return at - tip;
     const bool differs_here = differs(levelOf(*at));
     const bool rises = levelOf(*at) > 0;
-    const int min_run_px = differs_here             ? kMinStrangeRunPx
-                           : (balance > 0) == rises ? kMinRunPx
-                                                    : kMinFlippedRunPx;
+    const int min_run_px = differs_here && !DLSD_MUTANT("strange-runs") ? kMinStrangeRunPx
+                           : (balance > 0) == rises                     ? kMinRunPx
+                                                                        : kMinFlippedRunPx;
     Iterator behind = at;
     int run_px = 0;
     while (behind != other_end && behind->is_edge && run_px < min_run_px &&

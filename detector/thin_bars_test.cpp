@@ -3,6 +3,9 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
+#include <algorithm>
+#include <array>
+#include <vector>
 
 #include "detector/plane_curve.h"
 #include "detector/test_scene.h"
@@ -102,7 +105,129 @@ TEST(ThinBars, OneLineUpToTheBorder) {
   EXPECT_EQ(bars, 6);
 }
 
-// Two steps of the same sign 2.8 px apart are no bar, whatever they are.
+/// Convex, of pixels in either order.
+test::Shape quadrangle(const Camera& camera, const std::array<Vector2d, 4>& corners, double grey) {
+  test::Shape shape;
+  shape.axis = Vector3d::Zero();
+  for (const Vector2d& corner : corners) {
+    shape.vertices.push_back(*camera.unproject(corner));
+    shape.axis += shape.vertices.back();
+  }
+  shape.axis.normalize();
+  if (shape.vertices[0].cross(shape.vertices[1]).dot(shape.axis) < 0) {
+    std::reverse(shape.vertices.begin(), shape.vertices.end());
+  }
+  shape.grey = grey;
+  return shape;
+}
+
+/// Bright and dark bars, some with lighter ground on one side, in every camera: each side is a line
+/// of its own, and where the side is, from end to end.
+void expectSides(const std::vector<double>& angles_rad, double blur_px) {
+  constexpr double kGround = 100, kLighter = 140, kHalfLengthPx = 60, kSpacingPx = 42;
+  const std::array widths{2.6, 3.2, 4.0, 5.0};
+  int sides = 0, variant = 0;
+  for (const auto& [name, camera] : test::testCameras()) {
+    Detector detector(camera);
+    const RayTable rays(camera);
+    for (const double angle : angles_rad) {
+      const Vector2d centre(camera.width() / 2.0 + 8, camera.height() / 2.0 - 5);
+      const Vector2d along(std::cos(angle), std::sin(angle)), across(-along.y(), along.x());
+      test::Scene scene;
+      scene.background = kGround;
+      // An edge that stands alone tells the blur.
+      const Vector2d alone = centre + 105 * along;
+      scene.shapes.push_back(quadrangle(camera,
+                                        {alone - 150 * across,
+                                         alone + 150 * across,
+                                         alone + 150 * across + 40 * along,
+                                         alone - 150 * across + 40 * along},
+                                        180));
+      struct Side {
+        Vector3d normal;
+        Vector2d from, to;
+        double inwards;  ///< 1 if the bar is on the side of the normal.
+        double width_px;
+        bool bright;
+      };
+      std::vector<Side> all;
+      ++variant;
+      for (int i = 0; i < 8; ++i) {
+        const double half_px = widths[static_cast<size_t>(i) % 4] / 2;
+        const bool bright = (i + variant) % 2 == 0, lit = (i / 4 + i / 2 + variant / 2) % 2 == 0;
+        const Vector2d middle = centre + kSpacingPx * (i - 3.5) * across - 40 * along;
+        const Vector2d from = middle - kHalfLengthPx * along, to = middle + kHalfLengthPx * along;
+        if (lit) {
+          const Vector2d wide = 16 * across;
+          scene.shapes.push_back(
+              quadrangle(camera, {from, to, Vector2d(to + wide), Vector2d(from + wide)}, kLighter));
+        }
+        const Vector2d half = half_px * across;
+        scene.shapes.push_back(quadrangle(camera,
+                                          {Vector2d(from - half),
+                                           Vector2d(to - half),
+                                           Vector2d(to + half),
+                                           Vector2d(from + half)},
+                                          bright ? 230 : 20));
+        for (const double sign : {-1.0, 1.0}) {
+          const Vector2d a = from + sign * half, b = to + sign * half;
+          const Vector3d normal = camera.unproject(a)->cross(*camera.unproject(b)).normalized();
+          all.push_back(
+              {normal,
+               a,
+               b,
+               normal.dot(*camera.unproject(from) + *camera.unproject(to)) > 0 ? 1.0 : -1.0,
+               2 * half_px,
+               bright});
+        }
+      }
+      const auto image = test::toU8(test::render(scene, camera, blur_px), 1, 7);
+      const auto& lines = detector.detect(test::viewOf(image, camera));
+      for (const Side& side : all) {
+        SCOPED_TRACE(testing::Message() << name << " angle " << angle << " blur " << blur_px
+                                        << " width " << side.width_px << " bright " << side.bright);
+        // Nearer to it than to the other one, and of its polarity.
+        int found = 0;
+        double worst_px = 0;
+        for (const DetectedLine& line : lines) {
+          const Vector2d at = *camera.project(line.arc.at(0.5));
+          const double same_way = line.arc.normal.dot(side.normal) < 0 ? -1 : 1;
+          const bool is_bright = line.polarity * same_way * side.inwards > 0;
+          if (line.length_px < 40 || is_bright != side.bright ||
+              (at - (side.from + side.to) / 2).norm() > 40 ||
+              std::abs(curveOffset(rays.at(at.x(), at.y()), side.normal).offset_px) >
+                  side.width_px / 2) {
+            continue;
+          }
+          ++found;
+          // An end is known to its four rows, which are up to 5.7 px of a slanted edge.
+          EXPECT_GE(line.length_px, 2 * kHalfLengthPx - 12);
+          EXPECT_LE(line.length_px, 2 * kHalfLengthPx + 6);
+          for (int k = 0; k <= 10; ++k) {
+            const Vector2d px = *camera.project(line.arc.at(k / 10.0));
+            if (!rays.covers(px.x(), px.y())) continue;
+            worst_px = std::max(
+                worst_px, std::abs(curveOffset(rays.at(px.x(), px.y()), side.normal).offset_px));
+          }
+        }
+        EXPECT_EQ(found, 1);
+        EXPECT_LE(worst_px, 0.2);
+        ++sides;
+      }
+    }
+  }
+  EXPECT_EQ(sides, 4 * static_cast<int>(angles_rad.size()) * 8 * 2);
+}
+
+TEST(ThinBars, SidesAreWhereTheyAre) {
+  expectSides({0.1, 0.8, 2.7}, 0.7);
+}
+
+TEST(ThinBars, SidesAreWhereTheyAreThroughSoftOptics) {
+  expectSides({0.1, 1.9}, 1.0);
+}
+
+// Two steps of the same sign 1.6 px apart are no bar, whatever they are.
 TEST(ThinBars, StairsAreNoBar) {
   const Camera camera = test::testCameras()[0].camera;
   const RayTable rays(camera);
@@ -119,7 +244,7 @@ TEST(ThinBars, StairsAreNoBar) {
   };
   ThinBarMerger merger(rays);
   for (const auto& [polarity, apart, count] :
-       {std::tuple(1, 2.8, 2U), {-1, 2.8, 1U}, {-1, 3.4, 2U}, {-1, 0.5, 2U}}) {
+       {std::tuple(1, 1.6, 2U), {-1, 1.6, 1U}, {-1, 1.9, 1U}, {-1, 2.2, 2U}, {-1, 2.8, 2U}}) {
     std::vector<DetectedLine> lines{lineAt(200, 1), lineAt(200 + apart, polarity)};
     merger.merge(&lines);
     EXPECT_EQ(lines.size(), count) << polarity << " " << apart;
