@@ -129,7 +129,7 @@ TEST(Joints, LinesAreCutWhereTheyCross) {
           const bool swapped = variant % 3 == 0;
           std::vector<DetectedLine> lines{before[swapped ? 1 : 0], before[swapped ? 0 : 1]};
           lines.insert(lines.begin() + variant % 3, far_line);
-          cutAtJoints(rays, &lines);
+          JointCutter(rays).cut(&lines);
           ASSERT_EQ(lines.size(), 3U);
           SCOPED_TRACE(testing::Message() << name << " " << at.transpose() << " " << kink_deg << " "
                                           << a_px << " " << b_px << " variant " << variant);
@@ -141,8 +141,8 @@ TEST(Joints, LinesAreCutWhereTheyCross) {
             const Vector2d end = endAt(before[which], turned[which]);
             const double off_px =
                 std::abs(curveOffset(rays.at(end.x(), end.y()), other.arc.normal).offset_px);
-            if (std::abs(off_px - kSharedPx) < 0.15) continue;
-            if (off_px > kSharedPx) {
+            if (std::abs(off_px - JointCutter::kSharedPx) < 0.15) continue;
+            if (off_px > JointCutter::kSharedPx) {
               expectUnchanged(line, before[which]);
               ++kept;
               continue;
@@ -173,7 +173,7 @@ TEST(Joints, OtherLinesAreLeftAsTheyAre) {
     const auto expectLeft = [&](const DetectedLine& a, const DetectedLine& b) {
       for (const bool swapped : {false, true}) {
         std::vector<DetectedLine> lines{swapped ? b : a, swapped ? a : b};
-        cutAtJoints(rays, &lines);
+        JointCutter(rays).cut(&lines);
         ASSERT_EQ(lines.size(), 2U);
         expectUnchanged(lines[swapped ? 1 : 0], a);
         expectUnchanged(lines[swapped ? 0 : 1], b);
@@ -225,6 +225,61 @@ TEST(Joints, OtherLinesAreLeftAsTheyAre) {
     }
     EXPECT_EQ(pairs, 3 * 5 * 6 * 2);
   }
+}
+
+// Two edges of a corner that are seen up to a few px before it, or beyond, end in it; lines that
+// run past each other, end far from where they cross, or have their bright sides on different sides
+// of the corner are left as they are.
+TEST(Joints, EdgesOfACornerEndInIt) {
+  int met = 0, left = 0;
+  for (const auto& [name, camera] : test::testCameras()) {
+    const RayTable rays(camera);
+    int variant = 0;
+    for (const Vector2d& at : places(camera)) {
+      for (const double turn_deg : {-120.0, -70.0, -25.0, 25.0, 70.0, 120.0}) {
+        for (const auto& [a_px, b_px] :
+             {std::pair(-5.0, -5.0), {-7.0, 0.0}, {-6.5, 3.0}, {-8.5, -2.0}, {-20.0, -4.0}}) {
+          for (const bool is_corner : {true, false}) {
+            ++variant;
+            const Kink kink(camera, at, 0.7 * variant, turn_deg * kDeg, {a_px, b_px});
+            const bool turned[2] = {variant % 2 == 0, variant / 2 % 2 == 0};
+            DetectedLine before[2] = {kink.line(camera, 0, turned[0]),
+                                      kink.line(camera, 1, turned[1])};
+            // Of both, the bright side is that of the other one, or of both it is not.
+            for (const size_t which : {0U, 1U}) {
+              DetectedLine& line = before[which];
+              const double side = line.arc.normal.dot(kink.ends[1 - which]);
+              const bool bright_inside = (variant % 3 == 0) != (which == 1 && !is_corner);
+              line.polarity = (side > 0) == bright_inside ? 1 : -1;
+            }
+            std::vector<DetectedLine> lines{before[0], before[1]};
+            JointCutter(rays).meetAtCorners(&lines);
+            SCOPED_TRACE(testing::Message() << name << " " << at.transpose() << " " << turn_deg
+                                            << " " << a_px << " " << b_px << " " << variant);
+            const double farthest = std::max(std::abs(a_px), std::abs(b_px));
+            if (!is_corner || farthest > JointCutter::kCornerPx) {
+              expectUnchanged(lines[0], before[0]);
+              expectUnchanged(lines[1], before[1]);
+              ++left;
+              continue;
+            }
+            ++met;
+            for (const size_t which : {0U, 1U}) {
+              const DetectedLine& line = lines[which];
+              EXPECT_LE((endAt(line, turned[which]) - kink.vertex_px).norm(), 1e-6);
+              EXPECT_EQ(endAt(line, !turned[which]), endAt(before[which], !turned[which]));
+              EXPECT_EQ(line.arc.normal, before[which].arc.normal);
+              EXPECT_LE(std::abs(line.arc.normal.dot(line.arc.from)), 1e-12);
+              EXPECT_LE(std::abs(line.arc.normal.dot(line.arc.to)), 1e-12);
+              EXPECT_NEAR(line.length_px, lengthOf(camera, line), 0.5);
+            }
+          }
+        }
+      }
+    }
+  }
+  EXPECT_EQ(met, 4 * 3 * 6 * 3);
+  EXPECT_EQ(left, 4 * 3 * 6 * (5 + 2));
 }
 
 }  // namespace
