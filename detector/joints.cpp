@@ -3,12 +3,10 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <tuple>
 
-#include "detector/plane_curve.h"
-
 #include "cameras/mutant.h"
+#include "detector/plane_curve.h"
 
 namespace dlsd {
 namespace {
@@ -92,13 +90,13 @@ void JointCutter::cut(std::vector<DetectedLine>* lines) {
       // Most of the others are far away: a block of them is passed at once.
       for (size_t k = 0; k < count; ++k) {
         if (k % kBlock == 0) {
-          float least = std::numeric_limits<float>::max();
+          int near = 0;  // an integer: the loop is vectorised
           for (size_t j = k; j < k + kBlock; ++j) {
-            least = std::min(least,
-                             std::abs(normals_[0][j] * at.x() + normals_[1][j] * at.y() +
-                                      normals_[2][j] * at.z()));
+            const float distance = std::abs(normals_[0][j] * at.x() + normals_[1][j] * at.y() +
+                                            normals_[2][j] * at.z());
+            near |= distance <= bound_rad ? 1 : 0;
           }
-          if (!(least <= bound_rad)) {
+          if (near == 0) {
             k += kBlock - 1;
             continue;
           }
