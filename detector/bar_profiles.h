@@ -19,8 +19,10 @@ class BarProfiles {
   /// How far the side that seems to be here (even_narrow is 0) is away, px along the row, >= 0,
   /// towards the other side of the bar. That one is on the side of positive positions if
   /// even_wide / odd_narrow is negative. Of the bars that look alike the mean, of which wide ones
-  /// and those of equal contrasts count most: good to 0.05 px from a width of 2 px on, to 0.3 px
-  /// below. No value if no bar looks like that.
+  /// and those of equal contrasts count most: good to 0.05 px for widths from 2 px, contrasts from
+  /// 0.6 to 1.7 and variances from 0.3 to 1.1; to 0.12 px (0.17 at 2.5 px^2) for contrasts from 0.4
+  /// to 2.5; to 0.6 px below 2 px. No value if no bar looks similar, as wide ones at a variance
+  /// above 2 px^2, which seem to be where they are to 0.4 px (0.7 px at 3).
   /// @param blur_variance  Along the row, px^2; beyond the tables the nearest counts.
   /// @param odd_ratio  odd_wide / odd_narrow there.
   /// @param even_ratio  |even_wide / odd_narrow| there.

@@ -82,7 +82,7 @@ struct Detector::Impl {
     } else {
       planes.emplace(rays, the_options);
       bars.emplace(rays);
-      joints.emplace(rays);
+      joints.emplace(rays, the_options.validation.min_length_px);
     }
   }
 
@@ -126,7 +126,7 @@ void Detector::Impl::run(const ImageView& image, const BitRows& where) {
   if (bars) {
     bars->merge(&lines);
     joints->cut(&lines);
-    joints->meetAtCorners(&lines);
+    joints->meetAtCorners(where, &lines);
   }
   std::sort(lines.begin(), lines.end(), [](const DetectedLine& a, const DetectedLine& b) {
     const auto position = [](const DetectedLine& l) {

@@ -110,9 +110,12 @@ void JointCutter::cut(std::vector<DetectedLine>* lines) {
         }
         const auto crossing_px = camera.project(crossing);
         if (!crossing_px || !camera.inImage(*crossing_px)) continue;
-        line.length_px = std::max(0.0, line.length_px - (*crossing_px - px).norm());
+        const double length_px = line.length_px - (*crossing_px - px).norm();
+        if (!(length_px >= min_length_px_)) continue;
+        line.length_px = length_px;
         ray = crossing;
         px = *crossing_px;
+        break;
       }
     }
   }
@@ -150,18 +153,25 @@ void JointCutter::offerCorner(const std::vector<DetectedLine>& lines, Tip* a, Ti
   }
 }
 
-void JointCutter::meetAtCorners(std::vector<DetectedLine>* lines) {
-  const Camera& camera = rays_.camera();
-  // What ends at the border goes on.
-  constexpr double kBorderPx = 2;
+void JointCutter::meetAtCorners(const BitRows& usable, std::vector<DetectedLine>* lines) {
+  // What ends at the border, at the rim or at a mask goes on.
+  constexpr int kBorderPx = 3;
+  const auto isInside = [&](const Eigen::Vector2d& px) {
+    const int x = static_cast<int>(px.x() + 0.5), y = static_cast<int>(px.y() + 0.5);
+    for (const auto& [dx, dy] :
+         {std::pair(-kBorderPx, 0), {kBorderPx, 0}, {0, -kBorderPx}, {0, kBorderPx}}) {
+      if (x + dx < 0 || y + dy < 0 || x + dx >= usable.width || y + dy >= usable.height ||
+          !usable.contains(x + dx, y + dy)) {
+        return false;
+      }
+    }
+    return true;
+  };
   tips_.clear();
   for (size_t i = 0; i < lines->size(); ++i) {
     for (const bool at_from : {true, false}) {
       const Eigen::Vector2d& px = at_from ? (*lines)[i].from_px : (*lines)[i].to_px;
-      if (std::min({px.x(), px.y(), camera.width() - 1 - px.x(), camera.height() - 1 - px.y()}) <
-          kBorderPx) {
-        continue;
-      }
+      if (!isInside(px)) continue;
       tips_.push_back({i, at_from, px, px, Eigen::Vector3d::Zero(), 2 * kCornerPx});
     }
   }
@@ -178,11 +188,11 @@ void JointCutter::meetAtCorners(std::vector<DetectedLine>* lines) {
     }
   }
   for (const Tip& tip : tips_) {
-    if (!(tip.nearest_px <= kCornerPx)) continue;
+    if (!(tip.nearest_px <= kCornerPx) || !isInside(tip.corner_px)) continue;
     DetectedLine& line = (*lines)[tip.line];
     const Eigen::Vector2d& other_px = tip.at_from ? line.to_px : line.from_px;
     const double longer_px = (tip.corner_px - other_px).norm() - (tip.px - other_px).norm();
-    if (!(line.length_px + longer_px > kCornerPx)) continue;
+    if (!(line.length_px + longer_px >= min_length_px_)) continue;
     line.length_px += longer_px;
     (tip.at_from ? line.from_px : line.to_px) = tip.corner_px;
     (tip.at_from ? line.arc.from : line.arc.to) = tip.corner_ray;

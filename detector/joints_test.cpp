@@ -129,7 +129,7 @@ TEST(Joints, LinesAreCutWhereTheyCross) {
           const bool swapped = variant % 3 == 0;
           std::vector<DetectedLine> lines{before[swapped ? 1 : 0], before[swapped ? 0 : 1]};
           lines.insert(lines.begin() + variant % 3, far_line);
-          JointCutter(rays).cut(&lines);
+          JointCutter(rays, 5).cut(&lines);
           ASSERT_EQ(lines.size(), 3U);
           SCOPED_TRACE(testing::Message() << name << " " << at.transpose() << " " << kink_deg << " "
                                           << a_px << " " << b_px << " variant " << variant);
@@ -173,7 +173,7 @@ TEST(Joints, OtherLinesAreLeftAsTheyAre) {
     const auto expectLeft = [&](const DetectedLine& a, const DetectedLine& b) {
       for (const bool swapped : {false, true}) {
         std::vector<DetectedLine> lines{swapped ? b : a, swapped ? a : b};
-        JointCutter(rays).cut(&lines);
+        JointCutter(rays, 5).cut(&lines);
         ASSERT_EQ(lines.size(), 2U);
         expectUnchanged(lines[swapped ? 1 : 0], a);
         expectUnchanged(lines[swapped ? 0 : 1], b);
@@ -253,7 +253,7 @@ TEST(Joints, EdgesOfACornerEndInIt) {
               line.polarity = (side > 0) == bright_inside ? 1 : -1;
             }
             std::vector<DetectedLine> lines{before[0], before[1]};
-            JointCutter(rays).meetAtCorners(&lines);
+            JointCutter(rays, 5).meetAtCorners(UsableMask(camera).bits(), &lines);
             SCOPED_TRACE(testing::Message() << name << " " << at.transpose() << " " << turn_deg
                                             << " " << a_px << " " << b_px << " " << variant);
             const double farthest = std::max(std::abs(a_px), std::abs(b_px));

@@ -57,7 +57,7 @@ int pixelOf(float position) {
 }  // namespace
 
 LineTracer::LineTracer(const RayTable& rays, const ValidationOptions& options)
-    : rays_(rays), options_(options), bars_(barProfiles()) {}
+    : rays_(rays), options_(options), bars_(barProfiles()), blur_px2_(kUsualVariance) {}
 
 void LineTracer::setImage(const GreyPixels& pixels,
                           const BitRows& usable,
@@ -601,6 +601,8 @@ void LineTracer::moveBarSides() {
     const double fade = std::clamp(beyond / kFadeEven, 0.0, 1.0);
     const auto shift = static_cast<float>(std::copysign(fade * *shift_px, -even_ratio));
     for (size_t k = begin; k < end; ++k) {
+      // Across columns it would be another direction.
+      if (quads_[k].crosses_rows != middle.crosses_rows) continue;
       quads_[k].offset_px += shift;
       quads_[k].variance_px2 += kShare * kShare * shift * shift;
     }

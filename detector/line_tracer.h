@@ -50,7 +50,8 @@ class LineTracer {
                 const BitRows& usable,
                 const BitRows& seen,
                 double min_contrast);
-  /// Measures the image's blur where its pieces show edges that stand alone.
+  /// Measures the image's blur where its pieces show edges that stand alone; before the traces of
+  /// an image, or they assume what they knew before.
   void measureBlur(const std::vector<PlanarPiece>& pieces,
                    const std::vector<Eigen::Vector2f>& nodes);
   [[nodiscard]] const ResponseNoise& noise() const { return noise_; }
@@ -127,7 +128,7 @@ class LineTracer {
   GreyPixels pixels_;
   ResponseNoise noise_;
   const BarProfiles& bars_;
-  double blur_px2_ = 0;  // variance across an edge that stands alone, optics and pixel
+  double blur_px2_;  // variance across an edge that stands alone, optics and pixel
   float min_odd_narrow_ = 0, min_odd_wide_ = 0;
 
   std::vector<Quad> quads_;

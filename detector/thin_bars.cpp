@@ -48,7 +48,7 @@ bool ThinBarMerger::isBeside(const DetectedLine& line,
     if (!(outwards >= kMinApartPx && outwards <= max_apart_px)) return false;
   }
   *offset_px = at_middle;
-  return std::abs(at_middle) >= kMinApartPx && std::abs(at_middle) <= max_apart_px;
+  return std::abs(at_middle) <= max_apart_px;
 }
 
 /// Moves a line half way to its partners; false (and unchanged) if that gives no line.

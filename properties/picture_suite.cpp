@@ -79,7 +79,7 @@ Tally expectHolds(double share, const std::function<PictureCase()>& draw) {
 }
 
 /// Of the isolated lines, this share ends within 2 px.
-void expectEnough(const Tally& tally, double near_ends = 0.7) {
+void expectEnough(const Tally& tally, double near_ends = 0.9) {
   // Some views are too narrow for an isolated line of 60 px. Few cases say little: two standard
   // deviations below what is asked for are no failure.
   EXPECT_GE(tally.counted, tally.cases / 40);
