@@ -11,7 +11,7 @@ namespace {
 
 /// A 3D line subtends less than pi. What goes on (a horizon) is cut here; the rest is a line of its
 /// own.
-constexpr double kMaxAngleRad = 3.02;
+constexpr double kMaxAngleRad = 3.04;
 /// Rows that cross the curve, until it has turned this far beyond 45 degrees.
 constexpr double kTurnRatio = 1.25;
 /// Widest angle between an edge and the curve: tan(pi / 10).
@@ -357,8 +357,9 @@ void LineTracer::extend(int direction, Front* front) {
         break;
       }
       const double step_rad = last_ray.isZero() ? 0 : (q.ray - last_ray).norm();
-      if (angle_rad_ + step_rad > (DLSD_MUTANT("half-turn") ? 4 : kMaxAngleRad)) {
-        front->ended = true;
+      // From centre to centre; the ends reach half a step beyond.
+      if (angle_rad_ + 2 * step_rad > (DLSD_MUTANT("half-turn") ? 4 : kMaxAngleRad)) {
+        front->ended = front->at_limit = true;
         break;
       }
       angle_rad_ += step_rad;
@@ -787,6 +788,8 @@ std::optional<TracedLine> LineTracer::trace(const PlanarPiece& piece,
   // From the same border between rows, the other way.
   extend(+1, &front);
   if (points_ < 2 || !refit()) return std::nullopt;
+  // Then the other end is not taken on to the border, either.
+  if (front.at_limit || back.at_limit) front.at_border = back.at_border = false;
   if (!cutEnds(&front, &back)) return std::nullopt;
 
   double narrow = 0, wide = 0;

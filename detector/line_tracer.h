@@ -95,6 +95,7 @@ class LineTracer {
     double slope = 0, bend = 0;
     bool ended = false;
     bool at_border = false;  // where the camera ends
+    bool at_limit = false;   // of what a line subtends
   };
   struct End {
     Eigen::Vector2d px;
