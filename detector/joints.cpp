@@ -7,6 +7,7 @@
 
 #include "cameras/mutant.h"
 #include "detector/plane_curve.h"
+#include "detector/visible_arc.h"
 
 namespace dlsd {
 namespace {
@@ -37,20 +38,13 @@ bool JointCutter::crossingBefore(const DetectedLine& line,
     return false;
   }
   // On the other arc, which goes on beyond.
-  const double way = m.dot(other.arc.from.cross(other.arc.to)) < 0 ? -1 : 1;
-  const bool is_beside = way * m.dot(other.arc.from.cross(end_ray)) > 0 &&
-                         way * m.dot(end_ray.cross(other.arc.to)) > 0;
-  if (!is_beside) return false;
+  if (!isBesideArc(other.arc, end_ray)) return false;
   Eigen::Vector3d at = n.cross(m);
   if (!(at.norm() > 0)) return false;
   at.normalize();
   if (at.dot(end_ray) < 0) at = -at;
   // On this line, not far from its end.
-  const double its_way = n.dot(line.arc.from.cross(line.arc.to)) < 0 ? -1 : 1;
-  if (!(its_way * n.dot(line.arc.from.cross(at)) > 0 &&
-        its_way * n.dot(at.cross(line.arc.to)) > 0)) {
-    return false;
-  }
+  if (!isBesideArc(line.arc, at)) return false;
   if (pxBetween(at, end_ray, px_per_rad) > kMaxShare * line.length_px) return false;
   // The other line comes from about there and goes on where this one ends.
   const Eigen::Vector3d ahead = end_ray - at;

@@ -19,13 +19,6 @@ constexpr double kEvenRatio = 0.8;
 /// How much of the longer side must have a partner.
 constexpr double kMinCovered = 0.3;
 
-/// Whether a ray near the arc's plane is beside the arc itself, not the rest of the great circle.
-bool isBesideArc(const Arc& arc, const Eigen::Vector3d& ray) {
-  const double way = arc.normal.dot(arc.from.cross(arc.to)) < 0 ? -1 : 1;
-  return way * arc.normal.dot(arc.from.cross(ray)) >= 0 &&
-         way * arc.normal.dot(ray.cross(arc.to)) >= 0;
-}
-
 }  // namespace
 
 /// Whether `line` is the other side of a thin bar along `of`; how far away its middle is.

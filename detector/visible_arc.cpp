@@ -8,14 +8,6 @@
 namespace dlsd {
 namespace {
 
-/// Whether the ray's projection onto the arc's plane is on the arc itself, not on the rest of the
-/// great circle.
-bool isOnArc(const Arc& arc, const Eigen::Vector3d& ray) {
-  const double way = arc.normal.dot(arc.from.cross(arc.to)) < 0 ? -1 : 1;
-  return way * arc.normal.dot(arc.from.cross(ray)) >= 0 &&
-         way * arc.normal.dot(ray.cross(arc.to)) >= 0;
-}
-
 /// How far an arc stays in image and domain when walked from fraction t_from, which is inside,
 /// towards t_to. Steps are short against the distance to the image border, at least kStepPx.
 double lastInside(const Camera& camera, const Arc& arc, double t_from, double t_to) {
@@ -61,6 +53,12 @@ std::optional<Arc> clippedToImage(const Camera& camera, const Arc& arc) {
 
 }  // namespace
 
+bool isBesideArc(const Arc& arc, const Eigen::Vector3d& ray) {
+  const double way = arc.normal.dot(arc.from.cross(arc.to)) < 0 ? -1 : 1;
+  return way * arc.normal.dot(arc.from.cross(ray)) >= 0 &&
+         way * arc.normal.dot(ray.cross(arc.to)) >= 0;
+}
+
 std::optional<Arc> visibleArc(const Camera& camera,
                               const Eigen::Vector3d& plane_normal,
                               const Eigen::Vector3d& from_ray,
@@ -71,7 +69,7 @@ std::optional<Arc> visibleArc(const Camera& camera,
       plane_normal,
       from_ray,
       DLSD_MUTANT("line-ends") ? Eigen::Vector3d(to_ray + 0.05 * (to_ray - from_ray)) : to_ray);
-  if (!traced || !isOnArc(*traced, middle_ray)) return std::nullopt;
+  if (!traced || !isBesideArc(*traced, middle_ray)) return std::nullopt;
   return is_inside ? traced : clippedToImage(camera, *traced);
 }
 

@@ -19,6 +19,10 @@ namespace dlsd {
                                             const Eigen::Vector3d& to_ray,
                                             bool is_inside);
 
+/// Whether the ray's projection onto the arc's plane is on the arc itself, ends included, not on
+/// the rest of the great circle.
+[[nodiscard]] bool isBesideArc(const Arc& arc, const Eigen::Vector3d& ray);
+
 /// Length of the arc's image, to 1 %.
 [[nodiscard]] double curveLengthPx(const Camera& camera, const Arc& arc);
 

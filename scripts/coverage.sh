@@ -13,9 +13,10 @@ build=build/coverage
 if ! configured coverage DLSD_TESTS=ON; then configure coverage DLSD_TESTS=ON; fi
 build coverage
 find $build -name '*.gcda' -delete
+failed=0
 # A test that fails (or takes too long: counting makes it some ten times as slow) has run its lines.
 RC_PARAMS=${RC_PARAMS:-seed=1 max_success=20} \
-  ctest --test-dir $build -L quick -j"$(nproc)" --output-on-failure "$@" | tail -5 || true
+  ctest --test-dir $build -L quick -j"$(nproc)" --output-on-failure "$@" | tail -30 || failed=1
 gcovr --root . --object-directory $build --json-summary $build/coverage.json \
   --exclude-unreachable-branches --exclude-throw-branches -j "$(nproc)" \
   --gcov-ignore-parse-errors \
@@ -39,3 +40,7 @@ for f in sorted(files, key=lambda f: f["filename"]):
     if f["line_covered"] < 0.95 * f["line_total"]:
         print(f"  {f['filename']}: {f['line_covered']}/{f['line_total']} lines")
 PYTHON
+if ((failed)); then
+  echo "coverage.sh: tests failed (above); what they did before counts" >&2
+  exit 1
+fi
