@@ -82,6 +82,20 @@ double nearestOnSpine(const Tube& tube, const Vector3d& p) {
   return best;
 }
 
+namespace {
+
+/// The nearest point of the spine.
+Vector3d spineBeside(const Tube& tube, const Vector3d& p) {
+  if (tube.kind != Tube::Kind::kRing) return spineAt(tube, nearestOnSpine(tube, p));
+  // Without the angle, which would cost most of a ray's time.
+  const Vector3d d = p - tube.centre;
+  const double x = d.dot(tube.x), y = d.dot(tube.y), r = std::sqrt(x * x + y * y);
+  return r > 0 ? Vector3d(tube.centre + x / r * tube.x + y / r * tube.y)
+               : Vector3d(tube.centre + tube.x);
+}
+
+}  // namespace
+
 Tube transformed(const Tube& tube, const Eigen::Matrix3d& rotation, const Vector3d& origin) {
   Tube out = tube;
   out.centre = rotation * (tube.centre - origin);
@@ -115,7 +129,7 @@ std::optional<double> enterTube(
   for (int k = 0; k < kMaxSteps && s < far; ++k) {
     const Vector3d p = origin + s * direction;
     const double radius = tube.radius * (DLSD_MUTANT("tube-entry") ? 0.999 : 1);
-    const double distance = (p - spineAt(tube, nearestOnSpine(tube, p))).norm() - radius;
+    const double distance = (p - spineBeside(tube, p)).norm() - radius;
     if (distance < kTouch) return s > near ? std::optional(s) : std::nullopt;
     s += distance / length;
   }
