@@ -69,14 +69,22 @@ class Curves:
         self.d = np.concatenate([np.diff(c, axis=0) for c in curves])
         self.length2 = np.maximum(np.sum(self.d**2, axis=1), 1e-30)
 
+    def nearest(self, p):
+        """The shares of all pieces at which they are nearest to points, and the distances."""
+        p = np.asarray(p, float)
+        x, y = p[..., 0, None] - self.a[:, 0], p[..., 1, None] - self.a[:, 1]
+        dx, dy = self.d.T
+        t = np.minimum(np.maximum((x * dx + y * dy) / self.length2, 0), 1)
+        return t, np.hypot(x - t * dx, y - t * dy)
+
     def distances(self, p):
         """Of a point to all pieces, and the nearest points."""
-        t = np.clip(np.sum((p - self.a) * self.d, axis=1) / self.length2, 0, 1)
-        q = self.a + t[:, None] * self.d
-        return np.hypot(*(q - p).T), q
+        t, distances = self.nearest(p)
+        return distances, self.a + t[:, None] * self.d
 
     def distance(self, p):
-        return self.distances(p)[0].min()
+        """Of points to the nearest piece."""
+        return self.nearest(p)[1].min(axis=-1)
 
 
 def distance_to_curve(p, curve):
@@ -84,34 +92,41 @@ def distance_to_curve(p, curve):
 
 
 def at_share(curve, share):
-    """The point of a polyline at a share of its length."""
+    """The points of a polyline at shares of its length."""
     steps = np.hypot(*np.diff(curve, axis=0).T)
     length = np.concatenate([[0], np.cumsum(steps)])
-    return np.array([np.interp(share * length[-1], length, curve[:, k]) for k in (0, 1)])
+    return np.stack([np.interp(np.multiply(share, length[-1]), length, curve[:, k]) for k in (0, 1)], -1)
 
 
-def kb_project(K, D, ray):
-    theta = np.arctan2(np.hypot(ray[0], ray[1]), ray[2])
-    radius = theta * (1 + sum(k * theta ** (2 * i + 2) for i, k in enumerate(D)))
-    phi = np.arctan2(ray[1], ray[0])
-    return np.array([K[0][0] * radius * np.cos(phi) + K[0][2], K[1][1] * radius * np.sin(phi) + K[1][2]])
+def kb_radius(D, theta):
+    return theta * (1 + sum(k * theta ** (2 * i + 2) for i, k in enumerate(D)))
+
+
+def kb_project(K, D, rays):
+    x, y, z = np.moveaxis(rays, -1, 0)
+    radius = kb_radius(D, np.arctan2(np.hypot(x, y), z))
+    phi = np.arctan2(y, x)
+    return np.stack(
+        [K[0][0] * radius * np.cos(phi) + K[0][2], K[1][1] * radius * np.sin(phi) + K[1][2]], -1
+    )
 
 
 def kb_unproject(K, D, p):
-    x, y = (p[0] - K[0][2]) / K[0][0], (p[1] - K[1][2]) / K[1][1]
-    lo, hi = 0.0, np.pi / 2
+    x, y = (p[..., 0] - K[0][2]) / K[0][0], (p[..., 1] - K[1][2]) / K[1][1]
+    radius = np.hypot(x, y)
+    lo, hi = np.zeros_like(radius), np.full_like(radius, np.pi / 2)
     for _ in range(60):
         theta = (lo + hi) / 2
-        radius = theta * (1 + sum(k * theta ** (2 * i + 2) for i, k in enumerate(D)))
-        lo, hi = (theta, hi) if radius < np.hypot(x, y) else (lo, theta)
+        short = kb_radius(D, theta) < radius
+        lo, hi = np.where(short, theta, lo), np.where(short, hi, theta)
     phi = np.arctan2(y, x)
-    return np.array([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)])
+    return np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], -1)
 
 
 def great_circle(a, b, n):
     angle = np.arccos(np.clip(a @ b, -1, 1))
-    for t in np.linspace(0, 1, n):
-        yield (np.sin((1 - t) * angle) * a + np.sin(t * angle) * b) / np.sin(angle)
+    t = np.linspace(0, 1, n)[:, None]
+    return (np.sin((1 - t) * angle) * a + np.sin(t * angle) * b) / np.sin(angle)
 
 
 class Export(unittest.TestCase):
@@ -187,21 +202,17 @@ class Ulsd(Export):
                     np.testing.assert_allclose(D, KB["d"], rtol=1e-12)
                 curves = [Curves([c]) for c in curves]
                 # Their program makes the curve again of end points, K and D.
+                rays = kb_unproject(K, D, lines)
+                self.assertLess(np.arccos(rays[..., 2]).max(), np.pi / 2)
+                np.testing.assert_allclose(kb_project(K, D, rays), lines, atol=1e-6)
                 k = 0
-                for a, b in lines:
-                    rays = kb_unproject(K, D, a), kb_unproject(K, D, b)
-                    for ray, pixel in zip(rays, (a, b)):
-                        self.assertLess(np.arccos(ray[2]), np.pi / 2)
-                        np.testing.assert_allclose(kb_project(K, D, ray), pixel, atol=1e-6)
-                    if np.linalg.norm(a - b) < 1:
+                for ends, end_rays in zip(lines, rays):
+                    if np.linalg.norm(ends[0] - ends[1]) < 1:
                         continue
                     # In the order of the labels, which give none, one or two lines.
-                    while max(curves[k].distance(a), curves[k].distance(b)) > 0.02:
+                    while curves[k].distance(ends).max() > 0.02:
                         k += 1
-                    curve = curves[k]
-                    far = max(
-                        curve.distance(kb_project(K, D, ray)) for ray in great_circle(*rays, 9)
-                    )
+                    far = curves[k].distance(kb_project(K, D, great_circle(*end_rays, 9))).max()
                     self.assertLess(far, 0.02 if camera == "kb" else 0.15)
                     checked += 1
                 cut += len(lines) != len(curves)
@@ -209,19 +220,17 @@ class Ulsd(Export):
 
     def check_maps(self, npz, mask, offset, points):
         """The cells of points, and where in them the points are."""
-        in_cell = {}
-        for p in points:
-            in_cell.setdefault((int(p[1]), int(p[0])), []).append(p)
-        cells = set(in_cell)
+        cells, cell_of = np.unique(points[:, ::-1].astype(int), axis=0, return_inverse=True)
         self.assertEqual(npz[mask].shape, (1, 128, 128))
         self.assertEqual(npz[offset].shape, (2, 128, 128))
-        self.assertEqual({tuple(c) for c in np.argwhere(npz[mask][0] != 0)}, cells)
+        np.testing.assert_array_equal(np.argwhere(npz[mask][0] != 0), cells)
         self.assertTrue(np.all(np.isin(npz[mask], [0, 1])))
-        for (y, x), inside in in_cell.items():
-            stored = npz[offset][:, y, x]
-            np.testing.assert_array_less(abs(stored), 0.5 + 1e-6)
-            off = abs(np.array(inside) - (x, y) - 0.5 - stored).max(axis=1)
-            self.assertLess(off.min(), 2e-5 + 1e-5)
+        stored = npz[offset][:, cells[:, 0], cells[:, 1]].T
+        np.testing.assert_array_less(abs(stored), 0.5 + 1e-6)
+        off = abs(points - (cells[:, ::-1] + 0.5 + stored)[cell_of]).max(axis=1)
+        nearest = np.full(len(cells), np.inf)
+        np.minimum.at(nearest, cell_of, off)
+        np.testing.assert_array_less(nearest, 2e-5 + 1e-5)
         self.assertTrue(np.all(npz[offset][:, npz[mask][0] == 0] == 0))
 
     def check_npz(self, npz, stem, order, flip):
@@ -241,21 +250,21 @@ class Ulsd(Export):
         self.assertEqual(lpos.shape, (len(curves), order + 1, 2))
         self.assertEqual(npz["lneg"].size, 0)
         self.assertTrue(np.all(lpos[:, 0, 1] <= lpos[:, -1, 1]))
-        for points, original in zip(lpos, originals):
-            exact = [moved(at_share(original, k / order)) for k in range(order + 1)]
-            exact = np.clip(exact, 0, 128 - 1e-5)
-            if exact[0][1] > exact[-1][1] + 1e-4 or np.allclose(points[0], exact[-1], atol=1e-4):
-                exact = exact[::-1]
-            np.testing.assert_allclose(points, exact, atol=1e-4)
+        shares = np.arange(order + 1) / order
+        exact = moved(np.array([at_share(original, shares) for original in originals]))
+        exact = np.clip(exact, 0, 128 - 1e-5)
+        is_back = exact[:, 0, 1] > exact[:, -1, 1] + 1e-4
+        is_back |= np.isclose(lpos[:, 0], exact[:, -1], atol=1e-4).all(axis=1)
+        exact[is_back] = exact[is_back, ::-1]
+        np.testing.assert_allclose(lpos, exact, atol=1e-4)
         ends = np.concatenate([lpos[:, 0], lpos[:, -1]]).astype(float)
         junc = npz["junc"]
         rounded = {(round(x * 1000), round(y * 1000)) for x, y in junc}
         self.assertEqual(len(rounded), len(junc))
         np.testing.assert_allclose(junc, np.round(junc, 3), atol=1e-5)
-        for end in ends:
-            self.assertLess(np.hypot(*(junc - end).T).min(), 1.5e-3)
-        for j in junc:
-            self.assertLess(np.hypot(*(ends - j).T).min(), 1.5e-3)
+        apart = np.hypot(ends[:, 0, None] - junc[:, 0], ends[:, 1, None] - junc[:, 1])
+        np.testing.assert_array_less(apart.min(axis=1), 1.5e-3)
+        np.testing.assert_array_less(apart.min(axis=0), 1.5e-3)
         self.check_maps(npz, "jmap", "joff", junc)
         middles = np.array([np.clip(moved(at_share(c, 0.5)), 0, 128 - 1e-5) for c in originals])
         cells = {(int(y), int(x)) for x, y in middles}
@@ -273,16 +282,19 @@ class Ulsd(Export):
             centre = npz["coff"][:, y, x] + 0.5 + (x, y)
             stored = npz["eoff"][:, y, x].reshape(-1, 2) + centre
             rest = np.delete(lpos, order // 2, axis=1) if order % 2 == 0 else lpos
-            misfit = abs(stored - rest).max(axis=(1, 2)) + abs(middles - centre).max(axis=1)
+            off = abs(middles - centre).max(axis=1)
+            near = np.flatnonzero(off < 4e-4)
+            self.assertGreater(len(near), 0)
+            misfit = abs(stored - rest[near]).max(axis=(1, 2)) + off[near]
             self.assertLess(misfit.min(), 4e-4)
         lmap = npz["lmap"]
         self.assertEqual(lmap.shape, (1, 128, 128))
         self.assertTrue(np.all((lmap >= 0) & (lmap <= 1)))
         rng = np.random.default_rng(1)
         pieces = Curves(curves)
-        for y, x in rng.integers(0, 128, (150, 2)):
-            near = pieces.distance(np.array([x + 0.5, y + 0.5]))
-            self.assertAlmostEqual(lmap[0, y, x], max(0, 1 - near), places=4)
+        y, x = rng.integers(0, 128, (150, 2)).T
+        near = pieces.distance(np.stack([x + 0.5, y + 0.5], -1))
+        np.testing.assert_allclose(lmap[0, y, x], np.maximum(0, 1 - near), rtol=0, atol=5e-5)
 
     def test_npz(self):
         for order in (1, 2, 3, 4):
@@ -312,8 +324,7 @@ class Ulsd(Export):
                 self.assertEqual(npz["line"].shape, (len(curves), 7, 2))
                 self.assertEqual(npz["junc"].shape[1], 2)
                 for points, curve in zip(npz["line"], curves):
-                    for p in points:
-                        self.assertLess(distance_to_curve(p, curve), 1e-3)
+                    self.assertLess(distance_to_curve(points, curve).max(), 1e-3)
                     steps = np.hypot(*np.diff(points / [128 / 160, 128 / 120], axis=0).T)
                     self.assertLess(np.ptp(steps), 0.02 * steps.max() + 1e-3)
 
@@ -365,9 +376,9 @@ class Lcnn(Export):
         # As their loader restores junctions: (y, x) of a cell, plus its offset, plus one half.
         cells = np.argwhere(npz["jmap"][0] > 0)
         self.assertEqual({(int(y), int(x)) for y, x, _ in junc}, {tuple(c) for c in cells})
-        for y, x in cells:
-            restored = np.array([y, x]) + npz["joff"][0, :, y, x] + 0.5
-            self.assertLess(np.hypot(*(junc[:, :2] - restored).T).min(), 1e-4)
+        restored = cells + npz["joff"][0][:, cells[:, 0], cells[:, 1]].T + 0.5
+        apart = np.hypot(restored[:, 0, None] - junc[:, 0], restored[:, 1, None] - junc[:, 1])
+        np.testing.assert_array_less(apart.min(axis=1), 1e-4)
         # Chords of labels and positive lines are the same, (y, x) here.
         ends = []
         for curve in curves:
@@ -380,9 +391,13 @@ class Lcnn(Export):
 
         def farthest(segments, others):
             """The largest distance of a segment from the nearest other one, either way round."""
-            a = segments.reshape(-1, 1, 4)
-            ways = [abs(a - b.reshape(-1, 4)).max(axis=2).min(axis=1) for b in (others, others[:, ::-1])]
-            return np.minimum(*ways).max()
+
+            def apart(b):
+                return np.maximum.reduce(
+                    [abs(segments[:, i, j, None] - b[:, i, j]) for i in (0, 1) for j in (0, 1)]
+                ).min(axis=1)
+
+            return np.minimum(apart(others), apart(others[:, ::-1])).max()
 
         self.assertLess(farthest(positives, ends), 2e-3)
         long = np.hypot(*(ends[:, 0] - ends[:, 1]).T) > 2e-3
@@ -390,9 +405,9 @@ class Lcnn(Export):
         chords = [s[:, ::-1].astype(float) for s in lpos[:, :, :2]]
         rng = np.random.default_rng(2)
         pieces = Curves(chords)
-        for y, x in rng.integers(0, 128, (60, 2)):
-            near = pieces.distance(np.array([x + 0.5, y + 0.5]))
-            self.assertAlmostEqual(npz["lmap"][y, x], max(0, 1 - near), places=4)
+        y, x = rng.integers(0, 128, (60, 2)).T
+        near = pieces.distance(np.stack([x + 0.5, y + 0.5], -1))
+        np.testing.assert_allclose(npz["lmap"][y, x], np.maximum(0, 1 - near), rtol=0, atol=5e-5)
         # Hard examples first.
         steps = np.linspace(0, 1, 50)[:, None]
         a, b = lneg[:, 0, None, :2], lneg[:, 1, None, :2]
@@ -676,9 +691,10 @@ class Program(Export):
                     self.assertLessEqual(set(junction["lines"]), ids)
 
     def test_same_bytes_every_time(self):
-        for name in ("ulsd", "lcnn", "coco-line", "deeplsd", "webdataset"):
-            first = tree(self.export(name))
-            time.sleep(1.1)  # Formats have clocks of seconds.
+        names = ("ulsd", "lcnn", "coco-line", "deeplsd", "webdataset")
+        first = {name: tree(self.export(name)) for name in names}
+        time.sleep(1.1)  # Formats have clocks of seconds.
+        for name in names:
             again = subprocess.run(
                 [DLSD, "export", "--format", name, "--data", "data", "--out", "again"],
                 cwd=self.folder,
@@ -687,7 +703,7 @@ class Program(Export):
                 check=True,
             )
             self.assertIn(b"14 frames (", again.stdout)
-            self.assertEqual(tree(self.folder + "/again"), first)
+            self.assertEqual(tree(self.folder + "/again"), first[name])
             shutil.rmtree(self.folder + "/again")
 
     def test_refusals(self):

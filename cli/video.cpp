@@ -14,6 +14,8 @@
 #include <vector>
 
 #include "cameras/calibration/files.h"
+#include "cli/video_codecs.h"
+#include "synth/dataset/module.h"
 
 namespace dlsd::cli {
 namespace {
@@ -27,6 +29,12 @@ std::string endingOf(const std::string& path) {
     return char(std::tolower(c));
   });
   return ending;
+}
+
+const VideoCodecs& videoCodecs() {
+  static const auto& codecs =
+      *static_cast<const VideoCodecs*>(moduleTable("video", "dlsd_video_codecs"));
+  return codecs;
 }
 
 }  // namespace
@@ -50,8 +58,7 @@ bool isVideoName(const std::string& path) {
   return std::find(std::begin(kEndings), std::end(kEndings), endingOf(path)) != std::end(kEndings);
 }
 
-VideoReader::VideoReader(const std::string& path)
-    : path_(path), capture_(std::make_unique<cv::VideoCapture>()) {
+VideoReader::VideoReader(const std::string& path) : path_(path) {
   std::error_code error;
   if (!fs::exists(path, error)) {
     throw InputError(path + ": cannot be read: " +
@@ -61,9 +68,8 @@ VideoReader::VideoReader(const std::string& path)
     throw InputError(path + ": is no regular file, as a video must be");
   }
   // An absolute path, lest FFmpeg takes what is before a colon for a protocol.
-  if (!capture_->open(fs::absolute(path).string(),
-                      cv::CAP_FFMPEG,
-                      {cv::CAP_PROP_HW_ACCELERATION, cv::VIDEO_ACCELERATION_NONE})) {
+  capture_ = videoCodecs().openReader(fs::absolute(path).string());
+  if (capture_ == nullptr) {
     throw InputError(path + ": not a video that can be decoded (unknown, truncated or damaged)");
   }
   capture_->set(cv::CAP_PROP_ORIENTATION_AUTO, 0);
@@ -133,19 +139,18 @@ void VideoWriter::checkName(const std::string& path) {
 }
 
 VideoWriter::VideoWriter(const std::string& path, double rate, int width, int height)
-    : path_(path), width_(width), height_(height), writer_(std::make_unique<cv::VideoWriter>()) {
+    : path_(path), width_(width), height_(height) {
   const std::string ending = endingOf(path);
   std::error_code ignored;
   target_ = fs::exists(path, ignored) ? fs::canonical(path, ignored).string()
                                       : fs::absolute(path, ignored).string();
   // FFmpeg goes by the ending.
   temporary_ = fmt::format("{}.tmp-{}{}", target_, ::getpid(), ending);
-  const std::vector<int> codecs = ending == ".avi"
-                                      ? std::vector{cv::VideoWriter::fourcc('M', 'J', 'P', 'G')}
-                                      : std::vector{cv::VideoWriter::fourcc('a', 'v', 'c', '1'),
-                                                    cv::VideoWriter::fourcc('m', 'p', '4', 'v')};
-  for (const int codec : codecs) {
-    if (writer_->open(temporary_, cv::CAP_FFMPEG, codec, rate, cv::Size(width, height))) {
+  const std::vector<const char*> codecs =
+      ending == ".avi" ? std::vector{"MJPG"} : std::vector{"avc1", "mp4v"};
+  for (const char* codec : codecs) {
+    writer_ = videoCodecs().openWriter(temporary_, codec, rate, width, height);
+    if (writer_ != nullptr) {
       return;
     }
     fs::remove(temporary_, ignored);

@@ -33,9 +33,26 @@ function(dlsd_add_library name)
   endif()
 endfunction()
 
+# dlsd_add_module(NAME SOURCES a.cpp ... LIBS ...)
+# Builds libdlsd_NAME_module.so, which programs load when they first need it (synth/dataset/module.h). In the build tree
+# all programs find it, of the installed ones those with dlsd_module_rpath as their INSTALL_RPATH.
+set(CMAKE_BUILD_RPATH ${PROJECT_BINARY_DIR}/modules)
+file(RELATIVE_PATH dlsd_module_rpath ${CMAKE_INSTALL_FULL_BINDIR} ${CMAKE_INSTALL_FULL_LIBDIR}/dlsd)
+set(dlsd_module_rpath "$ORIGIN/${dlsd_module_rpath}")
+function(dlsd_add_module name)
+  cmake_parse_arguments(ARG "" "" "SOURCES;LIBS" ${ARGN})
+  set(target dlsd_${name}_module)
+  add_library(${target} MODULE ${ARG_SOURCES})
+  target_compile_features(${target} PRIVATE cxx_std_20)
+  target_include_directories(${target} PRIVATE ${PROJECT_SOURCE_DIR})
+  target_link_libraries(${target} PRIVATE ${ARG_LIBS} dlsd_warnings)
+  set_target_properties(${target} PROPERTIES LIBRARY_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR}/modules)
+  install(TARGETS ${target} LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR}/dlsd)
+endfunction()
+
 # dlsd_add_test(NAME LABELS quick SHARDS n SOURCES a_test.cpp ... LIBS ...)
 # One GoogleTest binary; each of its tests becomes a ctest of its own, or with SHARDS each n-th part of them: OpenCV's
-# libraries take 0.06 s to load, longer than many tests. Found only when DLSD_TESTS is on.
+# larger libraries take 0.06 s to load, longer than many tests. Found only when DLSD_TESTS is on.
 function(dlsd_add_test name)
   if(NOT DLSD_TESTS)
     return()

@@ -8,12 +8,12 @@
 #include <map>
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
-#include <opencv2/ximgproc/edge_drawing.hpp>
-#include <opencv2/ximgproc/fast_line_detector.hpp>
 #include <stdexcept>
 
 #include "cameras/arc.h"
 #include "cameras/calibration/files.h"
+#include "evaluation/peers/ximgproc_module.h"
+#include "synth/dataset/module.h"
 
 namespace dlsd {
 namespace {
@@ -21,6 +21,12 @@ namespace {
 using Eigen::Vector2d;
 
 using Segments = std::vector<cv::Vec4f>;
+
+const XimgprocDetectors& ximgproc() {
+  static const auto& detectors =
+      *static_cast<const XimgprocDetectors*>(moduleTable("ximgproc", "dlsd_ximgproc_detectors"));
+  return detectors;
+}
 
 double nowMs() {
   using Clock = std::chrono::steady_clock;
@@ -61,9 +67,9 @@ struct PeerDetector::Impl {
     if (name == "lsd") {
       lsd = cv::createLineSegmentDetector();
     } else if (name == "edlines") {
-      edge_drawing = cv::ximgproc::createEdgeDrawing();
+      edge_drawing = ximgproc().edgeDrawing();
     } else if (name == "fld") {
-      fld = cv::ximgproc::createFastLineDetector();
+      fld = ximgproc().fastLineDetector();
     } else {
       throw InputError(fmt::format(
           "peer \"{}\" is unknown, there are {}", name, fmt::join(peerDetectors(), ", ")));

@@ -4,12 +4,12 @@
 #include <array>
 #include <cstring>
 #include <opencv2/core.hpp>
-#include <opencv2/imgcodecs.hpp>
 #include <string>
 #include <string_view>
 #include <utility>
 
 #include "cameras/calibration/files.h"
+#include "synth/dataset/codecs.h"
 
 namespace dlsd {
 namespace {
@@ -97,21 +97,12 @@ bool isWholeJpeg(std::string_view s) {
 }  // namespace
 
 Image readImage(const std::string& path) {
-  std::string content = readFile(path);
+  const std::string content = readFile(path);
   if ((content.starts_with(kPngSignature) && !isWholePng(content)) ||
       (content.starts_with(kJpegSignature) && !isWholeJpeg(content))) {
     throw InputError(path + ": truncated or damaged image");
   }
-  cv::Mat mat;
-  if (!content.empty()) {
-    try {
-      // IMREAD_UNCHANGED: as stored, not rotated by EXIF.
-      mat = cv::imdecode(cv::Mat(1, static_cast<int>(content.size()), CV_8UC1, content.data()),
-                         cv::IMREAD_UNCHANGED);
-    } catch (const cv::Exception&) {
-      mat.release();  // Said below, in our words.
-    }
-  }
+  const cv::Mat mat = imageCodecs().decode(content);
   if (mat.empty()) throw InputError(path + ": not an image that can be decoded");
   const bool depth_ok = mat.depth() == CV_8U || mat.depth() == CV_16U;
   const int channels = mat.channels();
@@ -133,14 +124,8 @@ std::string encodePng(const Image& image) {
   swapRedAndBlue(&bgr);
   const int type = CV_MAKETYPE(image.bits == 8 ? CV_8U : CV_16U, image.channels);
   const cv::Mat mat(image.height, image.width, type, bgr.bytes.data());
-  std::vector<uint8_t> png;
-  bool ok = false;
-  try {
-    ok = cv::imencode(".png", mat, png, {cv::IMWRITE_PNG_COMPRESSION, 3});
-  } catch (const cv::Exception&) {
-    ok = false;
-  }
-  if (!ok) throw SystemError("an image could not be encoded as PNG");
+  const std::vector<uint8_t> png = imageCodecs().encodePng(mat);
+  if (png.empty()) throw SystemError("an image could not be encoded as PNG");
   return {png.begin(), png.end()};
 }
 
