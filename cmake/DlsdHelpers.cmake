@@ -37,6 +37,8 @@ endfunction()
 # Builds libdlsd_NAME_module.so, which programs load when they first need it (synth/dataset/module.h). In the build tree
 # all programs find it, of the installed ones those with dlsd_module_rpath as their INSTALL_RPATH.
 set(CMAKE_BUILD_RPATH ${PROJECT_BINARY_DIR}/modules)
+# As RPATH: RUNPATH is that of the caller of dlopen, and g++'s address sanitizer calls it for us.
+add_link_options(-Wl,--disable-new-dtags)
 file(RELATIVE_PATH dlsd_module_rpath ${CMAKE_INSTALL_FULL_BINDIR} ${CMAKE_INSTALL_FULL_LIBDIR}/dlsd)
 set(dlsd_module_rpath "$ORIGIN/${dlsd_module_rpath}")
 function(dlsd_add_module name)

@@ -5,7 +5,7 @@
 namespace dlsd {
 
 /// Address of a table (extern "C") in one of our modules, dlsd_add_module in CMake, which stays
-/// loaded; modules are found by the program's RUNPATH. Throws SystemError if there is none.
+/// loaded; modules are found by the program's RPATH. Throws SystemError if there is none.
 [[nodiscard]] const void* moduleTable(const char* module, const char* table);
 
 }  // namespace dlsd
