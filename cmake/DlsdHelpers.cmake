@@ -52,32 +52,36 @@ function(dlsd_add_module name)
   install(TARGETS ${target} LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR}/dlsd)
 endfunction()
 
-# dlsd_add_test(NAME LABELS quick SHARDS n SOURCES a_test.cpp ... LIBS ...)
+# dlsd_add_test(NAME LABELS quick SHARDS n COST seconds SOURCES a_test.cpp ... LIBS ...)
 # One GoogleTest binary; each of its tests becomes a ctest of its own, or with SHARDS each n-th part of them: OpenCV's
-# larger libraries take 0.06 s to load, longer than many tests. Found only when DLSD_TESTS is on.
+# larger libraries take 0.06 s to load, longer than many tests. COST is about how long the longest of them takes:
+# ctest -j starts long tests first, and knows them by itself only the second time. Found only when DLSD_TESTS is on.
 function(dlsd_add_test name)
   if(NOT DLSD_TESTS)
     return()
   endif()
-  cmake_parse_arguments(ARG "" "TIMEOUT;SHARDS" "SOURCES;LIBS;LABELS" ${ARGN})
+  cmake_parse_arguments(ARG "" "TIMEOUT;SHARDS;COST" "SOURCES;LIBS;LABELS" ${ARGN})
   if(NOT ARG_LABELS)
     set(ARG_LABELS quick)
   endif()
   if(NOT ARG_TIMEOUT)
     set(ARG_TIMEOUT 300)
   endif()
+  if(NOT ARG_COST)
+    set(ARG_COST 0)
+  endif()
   add_executable(${name} ${ARG_SOURCES})
   target_link_libraries(${name} PRIVATE ${ARG_LIBS} GTest::gmock GTest::gtest_main dlsd_warnings)
   target_compile_definitions(${name} PRIVATE DLSD_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
   if(NOT ARG_SHARDS)
     gtest_discover_tests(${name} DISCOVERY_TIMEOUT 60
-                         PROPERTIES LABELS "${ARG_LABELS}" TIMEOUT ${ARG_TIMEOUT})
+                         PROPERTIES LABELS "${ARG_LABELS}" TIMEOUT ${ARG_TIMEOUT} COST ${ARG_COST})
     return()
   endif()
   foreach(shard RANGE 1 ${ARG_SHARDS})
     math(EXPR index "${shard} - 1")
     add_test(NAME ${name}.${shard} COMMAND ${name})
-    set_tests_properties(${name}.${shard} PROPERTIES LABELS "${ARG_LABELS}" TIMEOUT ${ARG_TIMEOUT}
+    set_tests_properties(${name}.${shard} PROPERTIES LABELS "${ARG_LABELS}" TIMEOUT ${ARG_TIMEOUT} COST ${ARG_COST}
                          ENVIRONMENT "GTEST_TOTAL_SHARDS=${ARG_SHARDS};GTEST_SHARD_INDEX=${index}")
   endforeach()
 endfunction()
