@@ -442,6 +442,10 @@ std::vector<ImageSpan> imageSpans(const Camera& camera, const Arc& arc) {
   constexpr double kCoarse = 4 * kDeg;
   constexpr double kFineRad = 0.1 * kDeg;
   constexpr double kFinePx = 2;
+  // Where pixels differ in size by many powers of ten (a focal length of 0.001 px beside one of
+  // 1000, say), so fine a look would take for ever: what is left is taken as it is.
+  constexpr int kMostProbes = 1 << 16;
+  int probes = 0;
   std::vector<ImageSpan> spans;
 
   // Feeds neighbouring probes, in order, between which the state changes at most once.
@@ -475,8 +479,8 @@ std::vector<ImageSpan> imageSpans(const Camera& camera, const Arc& arc) {
         const double scale = std::max(left.scale, right.back().scale);
         const bool fine = length <= kFineRad && kRise * scale * length <= kFinePx;
         const double middle = left.t + (right.back().t - left.t) / 2;
-        if (fine || nothingBetween(left, right.back(), length) || !(middle > left.t) ||
-            !(middle < right.back().t)) {
+        if (fine || ++probes > kMostProbes || nothingBetween(left, right.back(), length) ||
+            !(middle > left.t) || !(middle < right.back().t)) {
           join(left, right.back());
           left = right.back();
           right.pop_back();

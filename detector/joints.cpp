@@ -17,6 +17,8 @@ constexpr double kGoesOnPx = 8, kDepartsPx = 2.5;
 /// How far from the crossing the other line may begin.
 constexpr double kGapPx = 12;
 constexpr double kMaxShare = 1.0 / 3;
+/// An end moves by a share of its line's length: of short lines corners are often chance.
+constexpr double kMaxLonger = 0.12;
 /// Of the angle between the edges of a corner.
 constexpr double kCosLeastAngle = 0.966;
 
@@ -134,7 +136,12 @@ void JointCutter::offerCorner(const std::vector<DetectedLine>& lines, Tip* a, Ti
   const auto px = rays_.camera().project(corner);
   if (!px || !rays_.covers(px->x(), px->y())) return;
   const double from_a = (*px - a->px).norm(), from_b = (*px - b->px).norm();
-  if (!(std::max(from_a, from_b) <= kCornerPx)) return;
+  const auto isNear = [&](const Tip& tip, double distance_px) {
+    return distance_px <=
+           std::min(kCornerPx,
+                    (DLSD_MUTANT("corner-share") ? 1 : kMaxLonger) * lines[tip.line].length_px);
+  };
+  if (!isNear(*a, from_a) || !isNear(*b, from_b)) return;
   const RaySample sample = rays_.at(px->x(), px->y());
   const Eigen::Vector2d across_a = curveOffset(sample, n).normal;
   const Eigen::Vector2d across_b = curveOffset(sample, m).normal;

@@ -31,7 +31,7 @@ class JointCutter {
   /// @param usable  Where edges may be: beyond it lines go on, so what ends there is left.
   void meetAtCorners(const BitRows& usable, std::vector<DetectedLine>* lines);
 
-  static constexpr double kCornerPx = 7.5;
+  static constexpr double kCornerPx = 12;
 
  private:
   struct Tip {

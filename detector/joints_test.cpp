@@ -238,7 +238,7 @@ TEST(Joints, EdgesOfACornerEndInIt) {
     for (const Vector2d& at : places(camera)) {
       for (const double turn_deg : {-120.0, -70.0, -25.0, 25.0, 70.0, 120.0}) {
         for (const auto& [a_px, b_px] :
-             {std::pair(-5.0, -5.0), {-7.0, 0.0}, {-6.5, 3.0}, {-8.5, -2.0}, {-20.0, -4.0}}) {
+             {std::pair(-5.0, -5.0), {-11.5, 0.0}, {-6.5, 3.0}, {-12.5, -2.0}, {-20.0, -4.0}}) {
           for (const bool is_corner : {true, false}) {
             ++variant;
             const Kink kink(camera, at, 0.7 * variant, turn_deg * kDeg, {a_px, b_px});
@@ -280,6 +280,49 @@ TEST(Joints, EdgesOfACornerEndInIt) {
   }
   EXPECT_EQ(met, 4 * 3 * 6 * 3);
   EXPECT_EQ(left, 4 * 3 * 6 * (5 + 2));
+}
+
+// Of short lines it is often chance that they meet: both must be long against what is added.
+TEST(Joints, ShortEdgesDoNotEndInACornerThatIsFarAway) {
+  int met = 0, left = 0;
+  for (const auto& [name, camera] : test::testCameras()) {
+    const RayTable rays(camera);
+    int variant = 0;
+    for (const Vector2d& at : places(camera)) {
+      for (const double short_px : {30.0, 60.0}) {
+        for (const double gap_px : {0.1 * short_px, 0.16 * short_px}) {
+          const bool first_is_short = ++variant % 2 == 0;
+          const std::array<double, 2> lengths{first_is_short ? short_px : 120.0,
+                                              first_is_short ? 120.0 : short_px};
+          const Kink kink(camera,
+                          at,
+                          0.7 * variant,
+                          90 * kDeg,
+                          {first_is_short ? -gap_px : 0.0, first_is_short ? 0.0 : -gap_px},
+                          lengths);
+          DetectedLine before[2] = {kink.line(camera, 0, false), kink.line(camera, 1, false)};
+          for (const size_t which : {0U, 1U}) {
+            const double side = before[which].arc.normal.dot(kink.ends[1 - which]);
+            before[which].polarity = side > 0 ? 1 : -1;
+          }
+          std::vector<DetectedLine> lines{before[0], before[1]};
+          JointCutter(rays, 5).meetAtCorners(UsableMask(camera).bits(), &lines);
+          SCOPED_TRACE(testing::Message()
+                       << name << " " << at.transpose() << " " << short_px << " " << gap_px);
+          const size_t which = first_is_short ? 0 : 1;
+          if (gap_px > 0.12 * short_px) {
+            expectUnchanged(lines[which], before[which]);
+            ++left;
+          } else {
+            EXPECT_LE((lines[which].to_px - kink.vertex_px).norm(), 1e-6);
+            ++met;
+          }
+        }
+      }
+    }
+  }
+  EXPECT_EQ(met, 4 * 3 * 2);
+  EXPECT_EQ(left, 4 * 3 * 2);
 }
 
 }  // namespace

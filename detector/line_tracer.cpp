@@ -504,22 +504,27 @@ double LineTracer::scoreOf() const {
   return (sum - n - n * std::log(sum / n)) / (2 * kCorrelated * std::log(10.0)) - log_tests;
 }
 
-/// How many rows of the last quad belong to the line (the first if it is the other one's turn),
-/// counted from within: the cut that fits best to an edge before and nothing behind.
-int LineTracer::rowsOfEnd(size_t first, size_t last) const {
-  const Quad& q = quads_[last];
+/// Mean response around the end of the line at quad `last`; `first` is at the other one.
+double LineTracer::levelAt(size_t first, size_t last, bool wide) const {
   double level = 0;
   int count = 0;
   const ptrdiff_t back = first < last ? -1 : 1;
   for (auto i = static_cast<ptrdiff_t>(last); count < 3; i += back) {
     const Quad& k = quads_[static_cast<size_t>(i)];
     if (k.is_edge) {
-      level += std::abs(static_cast<double>(wide_ ? k.mean.odd_wide : k.mean.odd_narrow));
+      level += std::abs(static_cast<double>(wide ? k.mean.odd_wide : k.mean.odd_narrow));
       ++count;
     }
     if (i == static_cast<ptrdiff_t>(first)) break;
   }
-  level /= count;
+  return level / count;
+}
+
+/// How many rows of the last quad belong to the line (the first if it is the other one's turn),
+/// counted from within: the cut that fits best to an edge before and nothing behind.
+int LineTracer::rowsOfEnd(size_t first, size_t last) const {
+  const Quad& q = quads_[last];
+  const double level = levelAt(first, last, wide_);
   const double sign = (wide_ ? q.mean.odd_wide : q.mean.odd_narrow) < 0 ? -1 : 1;
   double best = 0, sum = 0;
   int rows = 0;
@@ -534,11 +539,21 @@ int LineTracer::rowsOfEnd(size_t first, size_t last) const {
   return rows;
 }
 
+/// Of the nearest pixel of a position in the image.
+double LineTracer::greyAt(const Eigen::Vector2d& px) const {
+  const ptrdiff_t at =
+      pixelOf(static_cast<float>(px.y())) * pixels_.stride + pixelOf(static_cast<float>(px.x()));
+  return pixels_.u8 != nullptr ? static_cast<double>(pixels_.u8[at])
+                               : static_cast<double>(pixels_.fixed[at]) / kGreyUnit;
+}
+
 /// The end of the line at quad `last`; `first` is at the other one.
 LineTracer::End LineTracer::endOf(size_t first, size_t last, bool at_border) const {
   const Quad& q = quads_[last];
   const int direction = first < last ? 1 : -1;
-  const double rows = at_border ? kQuadPx : rowsOfEnd(first, last);
+  const int rows_of_end = rowsOfEnd(first, last);
+  at_border = at_border && 2 * rows_of_end > kQuadPx;
+  const double rows = at_border ? kQuadPx : rows_of_end;
   const int a = q.crosses_rows ? 0 : 1;
   Eigen::Vector2d px(static_cast<double>(q.x), static_cast<double>(q.y));
   const double ahead = direction * q.way * (rows - 2);
@@ -547,16 +562,47 @@ LineTracer::End LineTracer::endOf(size_t first, size_t last, bool at_border) con
   if (!rays_.covers(px.x(), px.y())) px = {static_cast<double>(q.x), static_cast<double>(q.y)};
   End end{px, rays_.at(px.x(), px.y()).ray};
   if (!at_border) return end;
+  // Which filters can't see any more: as far as pixels beside the curve differ like those before.
+  constexpr double kBesidePx = 1.5, kRimBlurPx = 2, kLeastShare = 0.35;
+  constexpr int kMaxUnseen = 6;
+  const double level = levelAt(first, last, false);
+  const bool rises = q.mean.odd_narrow > 0;
+  const double beside = kBesidePx / static_cast<double>(q.perpendicular);
   const int way = direction * q.way;
+  double best = 0, sum = 0;
+  int unseen = 0;
   for (int i = 0; i < options_.max_gap_px + kQuadPx; ++i) {
     const RaySample here = rays_.at(px.x(), px.y());
     const Eigen::Vector2d g(here.du.dot(normal_), here.dv.dot(normal_));
     if (!(std::abs(g[a]) > 0)) break;
     const double f = here.ray.dot(normal_);
+    const Eigen::Vector2d before = px;
     px[a] -= f / g[a] + way * g[1 - a] / g[a];
     px[1 - a] += way;
     if (!rays_.covers(px.x(), px.y())) break;
-    end = {px, rays_.at(px.x(), px.y()).ray};
+    const Eigen::Vector2d middle = 0.5 * (before + px);
+    const auto isClear = [&](double distance) {
+      Eigen::Vector2d at = middle;
+      at[a] = std::clamp(at[a] + distance, 0.0, (a == 0 ? pixels_.width : pixels_.height) - 1.0);
+      return rays_.covers(at.x(), at.y());
+    };
+    const auto besideAt = [&](double distance) {
+      Eigen::Vector2d at = middle;
+      at[a] += distance;
+      return at;
+    };
+    const Eigen::Vector2d low = besideAt(-beside), high = besideAt(beside);
+    if (rays_.camera().inImage(low) && rays_.camera().inImage(high) &&
+        isClear(-beside - kRimBlurPx) && isClear(beside + kRimBlurPx)) {
+      const double step = greyAt(high) - greyAt(low);
+      sum += (rises ? step : -step) - kLeastShare * level;
+    } else if (++unseen > kMaxUnseen) {
+      break;
+    }
+    if (sum >= best || DLSD_MUTANT("border-evidence")) {
+      best = sum;
+      end = {px, rays_.at(px.x(), px.y()).ray};
+    }
   }
   return end;
 }

@@ -116,7 +116,9 @@ class LineTracer {
   void moveBarSides();
   [[nodiscard]] bool isArc(const Eigen::Vector3d& normal) const;
   [[nodiscard]] double scoreOf() const;
+  [[nodiscard]] double levelAt(size_t first, size_t last, bool wide) const;
   [[nodiscard]] int rowsOfEnd(size_t first, size_t last) const;
+  [[nodiscard]] double greyAt(const Eigen::Vector2d& px) const;
   [[nodiscard]] End endOf(size_t first, size_t last, bool at_border) const;
   template <class Iterator>
   [[nodiscard]] ptrdiff_t looseQuads(Iterator tip, Iterator other_end) const;

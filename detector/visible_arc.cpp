@@ -45,9 +45,10 @@ std::optional<Arc> clippedToImage(const Camera& camera, const Arc& arc) {
   constexpr double kMiddle = 0.5;
   const double t0 = lastInside(camera, arc, kMiddle, 0), t1 = lastInside(camera, arc, kMiddle, 1);
   if (!(t1 > t0)) return std::nullopt;
+  // The very rays that were looked at: arc.at(1) differs from arc.to by rounding.
   Arc clipped = arc;
-  if (t0 > 0 && !DLSD_MUTANT("clip-start")) clipped.from = arc.at(t0);
-  if (t1 < 1) clipped.to = arc.at(t1);
+  if (!DLSD_MUTANT("clip-start")) clipped.from = arc.at(t0);
+  clipped.to = arc.at(t1);
   return clipped;
 }
 
@@ -70,7 +71,12 @@ std::optional<Arc> visibleArc(const Camera& camera,
       from_ray,
       DLSD_MUTANT("line-ends") ? Eigen::Vector3d(to_ray + 0.05 * (to_ray - from_ray)) : to_ray);
   if (!traced || !isBesideArc(*traced, middle_ray)) return std::nullopt;
-  return is_inside ? traced : clippedToImage(camera, *traced);
+  if (is_inside) {
+    // Where a pixel is hardly an angle, rounding decides where an end lies.
+    const auto from_px = camera.project(traced->from), to_px = camera.project(traced->to);
+    if (from_px && to_px && camera.inImage(*from_px) && camera.inImage(*to_px)) return traced;
+  }
+  return clippedToImage(camera, *traced);
 }
 
 double curveLengthPx(const Camera& camera, const Arc& arc) {

@@ -112,8 +112,47 @@ bool goesOn(const std::vector<float>& grey, const Camera& camera, const Detected
   return false;
 }
 
+/// Whether a pixel is so far from the image's border and rim.
+bool isClear(const Camera& camera, const Vector2d& px, double distance_px) {
+  for (int k = 0; k < 8; ++k) {
+    const double angle_rad = k * M_PI / 4;
+    const Vector2d q = px + distance_px * Vector2d(std::cos(angle_rad), std::sin(angle_rad));
+    if (!camera.inImage(q) || !camera.unproject(q)) return false;
+  }
+  return true;
+}
+
+/// Whether it is even on both sides of a line, 3 to 9 px from it, `corner_px` at its ends left out.
+bool isEvenBeside(const std::vector<float>& grey,
+                  const Camera& camera,
+                  const DetectedLine& line,
+                  double corner_px) {
+  constexpr float kLevels = 8;
+  const double from = corner_px / line.length_px;
+  const int count = static_cast<int>(line.length_px / 4);
+  for (int i = 0; i <= count; ++i) {
+    const double t = from + (1 - 2 * from) * i / count;
+    const auto p = camera.project(line.arc.at(t)), q = camera.project(line.arc.at(t + 0.01));
+    if (!p || !q) return false;
+    const Vector2d along = (*q - *p).normalized(), across(-along.y(), along.x());
+    for (const double side : {-1.0, 1.0}) {
+      float least = 255, most = 0;
+      for (const double distance : {3.0, 5.0, 7.0, 9.0}) {
+        const float value =
+            bilinear(grey, camera.width(), camera.height(), *p + side * distance * across);
+        least = std::min(least, value);
+        most = std::max(most, value);
+      }
+      if (!(most - least <= kLevels)) return false;
+    }
+  }
+  return true;
+}
+
 /// Whether nothing disturbs a line: 60 px long, of 25 grey levels, 10 px from all other lines and
-/// from border and rim, what is within 15 px of its own ends left out.
+/// from border and rim, what is within 15 px of its own ends left out, where there may be one other
+/// line (of a corner, or of what hides the rest); with two it is chance which of them ends it. And
+/// the picture itself is even on both sides, should the detector have missed another edge.
 bool isIsolated(const Seen& seen,
                 const std::vector<Seen>& all,
                 const Camera& camera,
@@ -131,18 +170,20 @@ bool isIsolated(const Seen& seen,
     }
   }
   for (const Vector2d& p : samples) {
-    for (int k = 0; k < 8; ++k) {
-      const Vector2d q = p + kClear * Vector2d(std::cos(k * M_PI / 4), std::sin(k * M_PI / 4));
-      if (!camera.inImage(q) || !camera.unproject(q)) return false;
-    }
+    if (!isClear(camera, p, kClear)) return false;
   }
+  int at_from = 0, at_to = 0;
   for (const Seen& other : all) {
     if (&other == &seen || other.curve.size() < 2) continue;
     for (const Vector2d& p : samples) {
       if (!atEnd(p) && !(test::distanceToPolyline(p, other.curve) >= kClear)) return false;
     }
+    at_from += test::distanceToPolyline(seen.line.from_px, other.curve) < kCorner ? 1 : 0;
+    at_to += test::distanceToPolyline(seen.line.to_px, other.curve) < kCorner ? 1 : 0;
   }
-  return !goesOn(grey, camera, seen.line) && contrastAlong(grey, camera, seen.line.arc) >= 25;
+  if (std::max(at_from, at_to) > 1) return false;
+  return !goesOn(grey, camera, seen.line) && contrastAlong(grey, camera, seen.line.arc) >= 25 &&
+         isEvenBeside(grey, camera, seen.line, kCorner);
 }
 
 /// How a picture was changed: where its pixels went.
@@ -154,12 +195,14 @@ struct Match {
 };
 
 /// The line of the changed picture that is nearest to a line of the first, by the distance of 21
-/// points of that one across, and of the ends.
+/// points of that one across; of those nearer than `same_px` (an edge may go on behind what hides
+/// it) the one whose ends are nearest.
 Match nearest(const Seen& seen,
               const Camera& camera,
               const PixelMap& forward,
               const std::vector<Seen>& changed,
-              const Camera& changed_camera) {
+              const Camera& changed_camera,
+              double same_px) {
   Match best{std::numeric_limits<double>::infinity(), 0, nullptr};
   for (const Seen& candidate : changed) {
     double across = 0;
@@ -178,12 +221,15 @@ Match nearest(const Seen& seen,
       const double scale = std::abs(side_px.x() * along_px.y() - side_px.y() * along_px.x());
       across = std::max(across, std::abs(candidate.line.arc.angleToPlane(*ray)) * scale);
     }
-    if (!(across < best.across_px)) continue;
+    if (!(across < std::max(best.across_px, same_px))) continue;
     const Vector2d a = forward(seen.line.from_px), b = forward(seen.line.to_px);
     const Vector2d &c = candidate.line.from_px, &d = candidate.line.to_px;
     const double ends = std::min(std::max((a - c).norm(), (b - d).norm()),
                                  std::max((a - d).norm(), (b - c).norm()));
-    best = {across, ends, &candidate};
+    const bool both_same = across <= same_px && best.across_px <= same_px;
+    if (both_same ? ends < best.ends_px : across < best.across_px) {
+      best = {across, ends, &candidate};
+    }
   }
   return best;
 }
@@ -343,10 +389,7 @@ bool staysInside(const Seen& seen,
   for (int i = 0; i <= 20; ++i) {
     const auto p = camera.project(seen.line.arc.at(i / 20.0));
     if (!p) return false;
-    for (int k = 0; k < 8; ++k) {
-      const Vector2d q = map(*p) + 12 * Vector2d(std::cos(k * M_PI / 4), std::sin(k * M_PI / 4));
-      if (!changed.inImage(q) || !changed.unproject(q)) return false;
-    }
+    if (!isClear(changed, map(*p), 12)) return false;
   }
   return true;
 }
@@ -364,7 +407,8 @@ void compare(const View& view,
     if (!view.isIsolated(seen)) continue;
     if (change.in_part && !staysInside(seen, view.camera, changed.camera, change.forward)) continue;
     ++outcome->counted;
-    const Match match = nearest(seen, view.camera, change.forward, changed.lines, changed.camera);
+    const Match match =
+        nearest(seen, view.camera, change.forward, changed.lines, changed.camera, change.across_px);
     if (match.line == nullptr || !(match.across_px <= change.across_px) ||
         !(match.ends_px <= change.ends_px)) {
       failAt(seen,
@@ -432,8 +476,6 @@ PictureOutcome checkChanged(const PictureCase& c, const DetectorOptions& options
       change.in_part = true;
       // Two paintings of 64 samples a pixel, each right to a part of this.
       change.across_px = 0.15;
-      // Where a line ends before a corner depends on its direction in the image.
-      change.ends_px = 8;
       const View changed(camera, test::render(turned, camera), options);
       compare(view, changed, change, with_shown, &outcome);
       break;
@@ -464,7 +506,7 @@ PictureOutcome checkChanged(const PictureCase& c, const DetectorOptions& options
         outcome.applies = max_x >= 0 && (right - left < w - 1 || bottom - top < h - 1);
         if (!outcome.applies) break;
         // Nothing that is near any line has changed.
-        change.across_px = 0.01;
+        change.across_px = 0.05;
         change.ends_px = 0.5;
       }
       const int pw = right - left + 1, ph = bottom - top + 1;
@@ -580,6 +622,7 @@ PictureOutcome checkEquation8(const PictureCase& c,
                               bool with_shown) {
   PictureOutcome outcome;
   const View view(c.camera, test::render(sceneOf(c, imageFieldAngle(c.camera)), c.camera), options);
+  constexpr double kFilterPx = 3;  // Nearer to border and rim the picture shows no edge.
   const double rho_px = options.validation.rho_px;
   const int w = c.camera.width(), h = c.camera.height();
   ShownPicture shown;
@@ -593,7 +636,7 @@ PictureOutcome checkEquation8(const PictureCase& c,
           acrossAt(c.camera, seen.line.arc, static_cast<double>(i) / count, 0.2 / count);
       if (!across) continue;
       const Vector2d& p = across->at;
-      if (std::min({p.x(), p.y(), w - 1 - p.x(), h - 1 - p.y()}) < 3) continue;
+      if (!isClear(c.camera, p, kFilterPx)) continue;
       // The slope across has a maximum within rho.
       const auto slopeAt = [&](double shift) {
         return std::abs(
@@ -680,49 +723,77 @@ PictureOutcome checkStraight(const PictureCase& c,
   return outcome;
 }
 
+/// Direction in which the image of an arc leaves its start.
+std::optional<Vector2d> startOf(const Camera& camera, const Arc& arc) {
+  const auto p = camera.project(arc.from), q = camera.project(arc.at(0.01));
+  if (!p || !q || (*q - *p).norm() == 0) return std::nullopt;
+  return (*q - *p).normalized();
+}
+
+/// A triangle with the arc as a side, whose corners there have 30 degrees or more in the image:
+/// sharper ones end lines long before. Seen from its inside, anticlockwise.
+std::optional<std::vector<Vector3d>> triangleOn(const Camera& camera, const Arc& arc) {
+  constexpr double kHeight = 0.6;  // Over the side's length.
+  const auto from = camera.project(arc.from), to = camera.project(arc.to);
+  const auto middle = camera.project(arc.at(0.5));
+  if (!from || !to || !middle) return std::nullopt;
+  const Vector2d side = *to - *from;
+  for (const double height : {kHeight, -kHeight}) {
+    const auto tip = camera.unproject(*middle + height * Vector2d(-side.y(), side.x()));
+    if (!tip) continue;
+    bool is_wide = true;
+    for (const auto& [corner, other] : {std::pair(arc.from, arc.to), {arc.to, arc.from}}) {
+      const auto along = arcBetween(corner, other), up = arcBetween(corner, *tip);
+      const auto a = along ? startOf(camera, *along) : std::nullopt;
+      const auto b = up ? startOf(camera, *up) : std::nullopt;
+      is_wide = is_wide && a && b && a->dot(*b) <= std::cos(M_PI / 6);
+    }
+    if (!is_wide) continue;
+    std::vector<Vector3d> corners{arc.from, arc.to, *tip};
+    if (arc.from.cross(arc.to).dot(*tip) < 0) std::swap(corners[0], corners[1]);
+    return corners;
+  }
+  return std::nullopt;
+}
+
 PictureOutcome checkPaintedAgain(const PictureCase& c,
                                  const DetectorOptions& options,
                                  bool with_shown) {
-  // A line ends some pixels before a corner, and the painted one has its corners where it ended.
-  constexpr double kPaintedEnds = 0.15, kPaintedAcrossPx = 0.2;  // Share of its length.
+  constexpr double kPaintedAcrossPx = 0.2;
   PictureOutcome outcome;
   const View view(c.camera, test::render(sceneOf(c, imageFieldAngle(c.camera)), c.camera), options);
   ShownPicture shown;
   if (with_shown) shown = view.shown();
   for (const Seen& seen : view.lines) {
-    if (!view.isIsolated(seen) || outcome.counted == 2) continue;
+    if (outcome.counted == 2 || !view.isIsolated(seen)) continue;
+    const auto corners = triangleOn(c.camera, seen.line.arc);
+    if (!corners) continue;
     ++outcome.counted;
-    // A triangle: the line, and a corner to one side of it.
-    const Arc& arc = seen.line.arc;
-    const Vector3d middle = arc.at(0.5);
-    const double height = std::min(0.6 * arc.angle(), 0.5);
-    const Vector3d tip = (std::cos(height) * middle + std::sin(height) * arc.normal).normalized();
-    std::vector<Vector3d> corners{arc.from, arc.to, tip};
-    if (arc.from.cross(arc.to).dot(tip) < 0) std::swap(corners[0], corners[1]);
     Scene scene;
     scene.background = 60;
-    scene.shapes.push_back({corners, (arc.from + arc.to + tip).normalized(), 1, 200});
+    const Vector3d centre = (*corners)[0] + (*corners)[1] + (*corners)[2];
+    scene.shapes.push_back({*corners, centre.normalized(), 1, 200});
     const View again(c.camera, test::render(scene, c.camera), options);
-    const Match match = nearest(seen, c.camera, samePlace, again.lines, c.camera);
-    if (!(match.across_px <= kPaintedAcrossPx) ||
-        !(match.ends_px <= kPaintedEnds * seen.line.length_px)) {
+    const Match match = nearest(seen, c.camera, samePlace, again.lines, c.camera, kPaintedAcrossPx);
+    if (!(match.across_px <= kPaintedAcrossPx) || !(match.ends_px <= kMostEndsPx)) {
       failAt(seen,
              fmt::format("painted alone, {:.3f} px across, {:.2f} px at the ends",
                          match.across_px,
                          match.ends_px),
              &shown,
              &outcome);
+      if (with_shown && outcome.shown.empty()) outcome.shown = {again.shown()};
       continue;
     }
     outcome.across_px.push_back(match.across_px);
     outcome.ends_px.push_back(match.ends_px);
   }
-  if (with_shown) outcome.shown = {shown};
+  if (with_shown) outcome.shown.insert(outcome.shown.begin(), shown);
   return outcome;
 }
 
-/// Length of the longest piece of a cone's outline that a great circle fits within 0.5 px.
-double longestStraightPiece(const Camera& camera, const test::Shape& cone) {
+/// Length of the longest piece of a cone's outline that a great circle fits within `rho_px`.
+double longestStraightPiece(const Camera& camera, const test::Shape& cone, double rho_px) {
   // The outline, and px per rad across it.
   constexpr int kPoints = 720;
   const Vector3d a = cone.axis.unitOrthogonal(), b = cone.axis.cross(a);
@@ -738,7 +809,7 @@ double longestStraightPiece(const Camera& camera, const test::Shape& cone) {
     scales.push_back(J ? Eigen::JacobiSVD<ProjectionJacobian>(*J).singularValues()(1) : 0.0);
     pixels.push_back(J && camera.inImage(*p) ? p : std::nullopt);
   }
-  // The longest run of outline points that lie within 0.5 px of the plane through the run's
+  // The longest run of outline points that lie within rho_px of the plane through the run's
   // quarter points (which halves the sagitta), by two pointers.
   double longest = 0;
   for (int i = 0; i < kPoints; ++i) {
@@ -753,7 +824,7 @@ double longestStraightPiece(const Camera& camera, const test::Shape& cone) {
       const double sagitta =
           std::abs(std::asin(std::clamp(chord.dot(rays[index(n / 2)]), -1.0, 1.0))) *
           scales[index(n / 2)];
-      if (sagitta > 2 * 0.5) break;
+      if (sagitta > 2 * rho_px) break;
       longest = std::max(longest, length);
     }
   }
@@ -769,13 +840,18 @@ PictureOutcome checkCurved(const PictureCase& c, const DetectorOptions& options,
   const View view(c.camera, test::render(scene, c.camera), options);
   ShownPicture shown;
   if (with_shown) shown = view.shown();
-  const double longest = longestStraightPiece(c.camera, cone);
+  constexpr double kRowsPx = 4;
+  const double longest = longestStraightPiece(c.camera, cone, options.validation.rho_px);
+  const double tight = longestStraightPiece(c.camera, cone, options.validation.tight_rho_px);
   for (const Seen& seen : view.lines) {
     ++outcome.counted;
-    // Shorter lines than the detector's least length of 15 px and a little say nothing.
-    const double allowed = std::max(longest, 20.0);
-    outcome.shares.push_back(seen.line.length_px / allowed);
-    if (!(seen.line.length_px <= allowed)) {
+    // A line's ends are known to the four rows it ends in; and any piece of an outline may be as
+    // long as the detector's shortest lines.
+    const auto allowed = [&](double straight) {
+      return std::max(straight, options.validation.min_length_px) + kRowsPx;
+    };
+    outcome.shares.push_back(seen.line.length_px / allowed(tight));
+    if (!(seen.line.length_px <= allowed(longest))) {
       failAt(seen,
              fmt::format("{:.1f} px where {:.1f} px are straight", seen.line.length_px, longest),
              &shown,
