@@ -85,15 +85,10 @@ bool ThinBarMerger::mergeInto(DetectedLine* line,
   const Eigen::Vector3d fitted =
       fit->normal.dot(normal) < 0 ? Eigen::Vector3d(-fit->normal) : fit->normal;
   const Camera& camera = rays_.camera();
-  const auto isSeen = [&](const Eigen::Vector3d& ray) {
-    const auto px = camera.project(ray);
-    return px && camera.inImage(*px);
-  };
-  // At the border, half way to a partner may be outside.
   const auto on_plane = arcOnPlane(fitted, from, to);
   if (!on_plane) return false;
-  const bool is_inside = isSeen(on_plane->from) && isSeen(on_plane->to);
-  auto arc = visibleArc(camera, fitted, from, on_plane->at(0.5), to, is_inside);
+  // At the border, half way to a partner may be outside.
+  auto arc = visibleArc(camera, fitted, from, on_plane->at(0.5), to, true);
   if (!arc) return false;
   const auto from_px = camera.project(arc->from), to_px = camera.project(arc->to);
   if (!from_px || !to_px || !camera.inImage(*from_px) || !camera.inImage(*to_px)) return false;

@@ -8,6 +8,11 @@
 namespace dlsd {
 namespace {
 
+bool isSeen(const Camera& camera, const Eigen::Vector3d& ray) {
+  const auto pixel = camera.project(ray);
+  return pixel && camera.inImage(*pixel);
+}
+
 /// How far an arc stays in image and domain when walked from fraction t_from, which is inside,
 /// towards t_to. Steps are short against the distance to the image border, at least kStepPx.
 double lastInside(const Camera& camera, const Arc& arc, double t_from, double t_to) {
@@ -65,17 +70,14 @@ std::optional<Arc> visibleArc(const Camera& camera,
                               const Eigen::Vector3d& from_ray,
                               const Eigen::Vector3d& middle_ray,
                               const Eigen::Vector3d& to_ray,
-                              bool is_inside) {
+                              bool ends_tell) {
   const auto traced = arcOnPlane(
       plane_normal,
       from_ray,
       DLSD_MUTANT("line-ends") ? Eigen::Vector3d(to_ray + 0.05 * (to_ray - from_ray)) : to_ray);
   if (!traced || !isBesideArc(*traced, middle_ray)) return std::nullopt;
-  if (is_inside) {
-    // Where a pixel is hardly an angle, rounding decides where an end lies.
-    const auto from_px = camera.project(traced->from), to_px = camera.project(traced->to);
-    if (from_px && to_px && camera.inImage(*from_px) && camera.inImage(*to_px)) return traced;
-  }
+  // The last fit may have moved an end; where a pixel is hardly an angle, rounding decides.
+  if (ends_tell && isSeen(camera, traced->from) && isSeen(camera, traced->to)) return traced;
   return clippedToImage(camera, *traced);
 }
 

@@ -11,13 +11,13 @@ namespace dlsd {
 
 /// What the image shows of a plane from ray to ray by way of a third between them. No value if that
 /// is nothing, or a half turn or more: no 3D line.
-/// @param is_inside  The whole curve is known to lie in image and domain: nothing needs to be cut.
+/// @param ends_tell  If both ends are in image and domain, all in between is known to be, too.
 [[nodiscard]] std::optional<Arc> visibleArc(const Camera& camera,
                                             const Eigen::Vector3d& plane_normal,
                                             const Eigen::Vector3d& from_ray,
                                             const Eigen::Vector3d& middle_ray,
                                             const Eigen::Vector3d& to_ray,
-                                            bool is_inside);
+                                            bool ends_tell);
 
 /// Whether the ray's projection onto the arc's plane is on the arc itself, ends included, not on
 /// the rest of the great circle.

@@ -3,6 +3,7 @@
 //
 // By libFuzzer, with DLSD_FUZZ=ON and clang (fuzz/README.md); fuzz/replay.cpp runs the same over
 // saved inputs with any compiler.
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
@@ -55,7 +56,8 @@ Camera takeCamera(Bytes* bytes, int width, int height) {
     ((I == which ? void(name = std::variant_alternative_t<I, CameraModelVariant>::kName) : void()),
      ...);
     return name;
-  }(std::make_index_sequence<kModels>(), static_cast<size_t>(bytes->below(kModels)));
+  }
+  (std::make_index_sequence<kModels>(), static_cast<size_t>(bytes->below(kModels)));
   std::vector<double> params;
   for (const ParamSpec& spec : paramSpecsOf(model)) {
     const bool wild = bytes->byte() % 8 == 0;
@@ -65,11 +67,8 @@ Camera takeCamera(Bytes* bytes, int width, int height) {
     if (spec.name == "cy") params.back() = bytes->real(-0.2, 1.2) * height;
     if (spec.name == "fx" || spec.name == "fy") params.back() = bytes->real(0.1, 2) * width;
   }
-  return makeCamera(model,
-                    params,
-                    width,
-                    height,
-                    bytes->byte() % 4 == 0 ? bytes->real(0.05, M_PI) : M_PI);
+  return makeCamera(
+      model, params, width, height, bytes->byte() % 4 == 0 ? bytes->real(0.05, M_PI) : M_PI);
 }
 
 DetectorOptions takeOptions(Bytes* bytes) {
@@ -110,7 +109,8 @@ void checkLines(const Camera& camera, const std::vector<DetectedLine>& lines) {
 }
 
 void checkDetection(Bytes bytes) {
-  const int width = 1 + bytes.below(96), height = 1 + bytes.below(96);
+  // The time of an input goes with its area. Wider than the 64 pixels of a word of bits, though.
+  const int width = 1 + bytes.below(96), height = 1 + bytes.below(std::min(96, 2304 / width));
   constexpr int kChannels[] = {1, 3, 4, 1};
   ImageView view;
   view.width = width;
@@ -126,8 +126,7 @@ void checkDetection(Bytes bytes) {
   const Camera camera = takeCamera(&bytes, width, height);
   Detector detector(camera, options);
 
-  std::vector<uint8_t> pixels(static_cast<size_t>(view.stride_bytes) *
-                              static_cast<size_t>(height));
+  std::vector<uint8_t> pixels(static_cast<size_t>(view.stride_bytes) * static_cast<size_t>(height));
   bytes.fill(&pixels);
   // No byte beyond the last pixel belongs to the image.
   pixels.resize(pixels.size() - static_cast<size_t>(view.stride_bytes) +

@@ -73,15 +73,6 @@ constexpr std::array<Format, 14> kFormats{{
      nullptr},
 }};
 
-constexpr std::array<CalibrationFormat, kFormats.size()> kPublicFormats = [] {
-  std::array<CalibrationFormat, kFormats.size()> all{};
-  for (size_t i = 0; i < all.size(); ++i) {
-    const Format& f = kFormats.at(i);
-    all.at(i) = {f.name, f.about, f.recognises != nullptr, f.write != nullptr};
-  }
-  return all;
-}();
-
 template <class Predicate>
 std::string formatNames(Predicate predicate) {
   std::vector<std::string_view> names;
@@ -287,7 +278,16 @@ const NamedCamera& onlyCamera(const std::vector<NamedCamera>& cameras, std::stri
 }  // namespace calib
 
 std::span<const CalibrationFormat> calibrationFormats() {
-  return calib::kPublicFormats;
+  // Not constexpr: to g++'s UBSan the address of a function is no constant (GCC bug 71962).
+  static const auto formats = [] {
+    std::array<CalibrationFormat, calib::kFormats.size()> all{};
+    for (size_t i = 0; i < all.size(); ++i) {
+      const calib::Format& f = calib::kFormats.at(i);
+      all.at(i) = {f.name, f.about, f.recognises != nullptr, f.write != nullptr};
+    }
+    return all;
+  }();
+  return formats;
 }
 
 LoadedCalibration parseCalibration(std::string_view text,
