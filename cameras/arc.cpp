@@ -227,7 +227,7 @@ double distanceToChord(const Eigen::Vector2d& p,
 }
 
 /// Appends the points between p0 and p1 (exclusive) that keep the curve within tolerance of its
-/// chords, judged by the middle of each piece.
+/// chords, judged by the middle and the quarters of each piece.
 template <class Sampler>
 void refine(const Camera& camera,
             const Sampler& arc,
@@ -238,15 +238,19 @@ void refine(const Camera& camera,
             double tolerance,
             int depth,
             std::vector<Eigen::Vector2d>* out) {
+  const auto at = [&](double share) { return camera.project(arc.at(t0 + (t1 - t0) * share)); };
+  const auto isNear = [&](const std::optional<Eigen::Vector2d>& p) {
+    return !p || distanceToChord(*p, p0, p1) <= tolerance;
+  };
+  const auto pm = at(0.5);
+  if (depth == 0 || !pm || (isNear(pm) && isNear(at(0.25)) && isNear(at(0.75)))) return;
   const double tm = t0 + (t1 - t0) / 2;
-  const auto pm = camera.project(arc.at(tm));
-  if (depth == 0 || !pm || distanceToChord(*pm, p0, p1) <= tolerance) return;
   refine(camera, arc, t0, p0, tm, *pm, tolerance, depth - 1, out);
   out->push_back(*pm);
   refine(camera, arc, tm, *pm, t1, p1, tolerance, depth - 1, out);
 }
 
-/// imageCurve with the sampler that the camera needs, judged by the middles of pieces.
+/// imageCurve with the sampler that the camera needs.
 template <class Sampler>
 std::vector<Eigen::Vector2d> curveOf(
     const Camera& camera, const Sampler& sampler, double t0, double t1, double tolerance) {
@@ -524,7 +528,8 @@ std::vector<Eigen::Vector2d> imageCurve(
       return points;
     }
   }
-  // The curve may be a little further from its chord beside the middle, where it is measured.
+  // Between the places where it is measured, a curve whose distance to the chord is a cubic of t is
+  // at most 1.094 times as far off.
   return curveOf(
       camera, sampler, t0, t1, (DLSD_MUTANT("arc-chord") ? 1.5 : 0.9) * max_chord_err_px);
 }

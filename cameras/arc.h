@@ -77,9 +77,9 @@ struct ImageSpan {
 [[nodiscard]] std::vector<ImageSpan> imageSpans(const Camera& camera, const Arc& arc);
 
 /// Points on the image of the piece [t0, t1] of an arc, first and last included, joined by straight
-/// pieces that keep within max_chord_err_px of the true curve: measured at the middle of each piece
-/// (and at the quarters of the four it starts from). The piece must be imaged throughout (a span of
-/// imageSpans); a point that falls out of the domain by rounding is left out. An end on a seam is
+/// pieces that keep within max_chord_err_px of the true curve: measured at the middle and the
+/// quarters of each piece, with room for what a cubic does in between. The piece must be imaged
+/// throughout (a span of imageSpans); a point that falls out of the domain by rounding is left out. An end on a seam is
 /// drawn on the piece's own side of it; at a pole the curve ends 1e-8 rad before. Nothing is drawn
 /// across a seam: of a piece that goes on behind one, only the longest part is drawn.
 [[nodiscard]] std::vector<Eigen::Vector2d> imageCurve(
