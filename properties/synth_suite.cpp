@@ -121,6 +121,8 @@ bool isInner(EndKind kind) {
 }
 
 constexpr double kNearbyRad = 2e-5;
+/// Nearer to a border, rays of floats may be on either side.
+constexpr double kRoundingRad = 3e-7;
 /// Where the contrast is stated.
 constexpr double kBesideRad = 2e-4;
 /// Contrast is stated from this many places spread evenly over a label's angle.
@@ -212,26 +214,57 @@ class Eye {
   Eigen::Matrix3d world_from_cam_;
 };
 
+/// The point of a label (camera frame) at this angle from its first end.
+Vector3d pointAt(const LabelLine& line, double phi) {
+  const auto& [a, b] = line.points_in_cam;
+  const Vector3d normal = a.cross(b).normalized();
+  const Vector3d from = a.normalized(), side = normal.cross(from);
+  const Vector3d across = normal.cross(std::cos(phi) * from + std::sin(phi) * side);
+  return a + (b - a) * (across.dot(a) / across.dot(a - b));
+}
+
+/// Whether what casts this border stands so near to a point of it (camera frame) that pictures show
+/// no shadow there.
+bool isInShadowGap(const Viewed& seen, const LabelLine& line, const Vector3d& point_in_cam) {
+  const Edge& border = seen.scene.edges[static_cast<size_t>(line.edge)];
+  if (border.source != EdgeSource::kShadow) return false;
+  const Vector3d point =
+      seen.pose.cam_from_world.transpose() * point_in_cam + seen.pose.position_in_world;
+  const Edge& caster = seen.scene.edges[static_cast<size_t>(border.caster)];
+  const Light& light = seen.scene.lights[static_cast<size_t>(border.light)];
+  const bool is_sun = light.kind == Light::Kind::kSun;
+  const Vector3d way = is_sun ? Vector3d(kSunDistance * light.place) : light.place - point;
+  const Vector3d to_light = way.normalized(), d = caster.to - caster.from;
+  const double cosine = litPlaneOf(seen.scene, border).normal.dot(to_light);
+  const Vector3d across = d.cross(to_light).cross(to_light);  // In the caster's plane.
+  const Vector3d place = caster.from + d * (across.dot(point - caster.from) / across.dot(d));
+  return to_light.dot(place - point) <= shadowGap(way.norm(), cosine);
+}
+
 // --- Properties ---
 
-// 2e-5 rad off to both sides of a label's curve there are different surfaces, or light and shadow;
-// 2e-4 rad off, grey levels differ by its least contrast.
+// To both sides of a label's curve there are different surfaces, or light and shadow, 2e-5 rad off
+// or, where the next border is nearer than that, less; 2e-4 rad off, grey levels differ by its
+// least contrast.
 TEST(SynthSuite, LabelsLieOnDiscontinuities) {
-  Worst worst("share of points of labels that are no borders");
+  long points_seen = 0, gaps_seen = 0;
   holds(1, [&] {
     const Case c = *genCase();
     const Camera camera = *genSmallCamera();
     SceneView view = makeView(c);
     const Viewed seen(std::move(view.scene), view.pose, camera);
     const Eye eye(seen, camera);
-    int checked = 0, flat = 0;
+    int checked = 0, flat = 0, in_gap = 0;
     for (const LabelLine& line : seen.labels.lines) {
       if (isMiddle(seen.scene, line) || line.contrast_min < 3) continue;
       // One of the places at which contrast is stated, through the image.
-      const Vector3d from = line.points_in_cam[0].normalized();
-      const Vector3d side = from.cross(line.points_in_cam[1]).normalized().cross(from);
       const double phi = line.angle_rad * (line.id % kContrastPlaces + 0.5) / kContrastPlaces;
-      const auto p = camera.project(std::cos(phi) * from + std::sin(phi) * side);
+      const Vector3d point = pointAt(line, phi);
+      if (isInShadowGap(seen, line, point)) {
+        ++in_gap;
+        continue;
+      }
+      const auto p = camera.project(point);
       RC_ASSERT(p.has_value());
       RC_ASSERT(distanceTo(line.points, *p) <= 0.0101);
       const auto ray = camera.unproject(*p);
@@ -240,7 +273,11 @@ TEST(SynthSuite, LabelsLieOnDiscontinuities) {
       const auto look = [&](double beside_rad) {
         return eye.along(*ray + beside_rad * line.normal);
       };
-      const bool is_border = !look(kNearbyRad).isSame(look(-kNearbyRad));
+      // Where the next border is nearer than that, this one is seen from nearer still.
+      bool is_border = false;
+      for (double off = kNearbyRad; !is_border && off > kRoundingRad; off /= 2) {
+        is_border = !look(off).isSame(look(-off));
+      }
       const double step = std::abs(eye.grey(look(kBesideRad)) - eye.grey(look(-kBesideRad)));
       if (is_border && step >= 0.95 * line.contrast_min - 0.5) continue;
       ++flat;
@@ -250,11 +287,14 @@ TEST(SynthSuite, LabelsLieOnDiscontinuities) {
     }
     RC_PRE(checked > 0);
     RC_LOG() << flat << " of " << checked << " points";
-    worst.see(static_cast<double>(flat) / checked);
+    points_seen += checked;
+    gaps_seen += in_gap;
     RC_TAG(c.preset);
-    // Something thinner than that, or the next line nearer, may stand beside a point.
-    RC_ASSERT(flat <= 1 + checked / 300);
+    RC_ASSERT(flat == 0);
   });
+  std::cout << "    in the gap between a shadow and what casts it: " << gaps_seen << ", elsewhere "
+            << points_seen << " points\n";
+  EXPECT_LE(gaps_seen, points_seen / 1000);
 }
 
 // A point of an edge is in a span if and only if brute force over all triangles and round things
@@ -329,6 +369,11 @@ class ImageGrid {
   std::vector<std::vector<T>> cells_;
 };
 
+/// Of two hits of rays from one place.
+bool isBefore(const Hit& a, const Hit& b) {
+  return a.kind != HitKind::kNothing && (b.kind == HitKind::kNothing || a.distance < b.distance);
+}
+
 /// A place where the picture jumps.
 struct Jump {
   Vector2d pixel;
@@ -338,11 +383,15 @@ struct Jump {
 struct Jumps {
   std::vector<Jump> unexplained;
   size_t count = 0;  ///< With those that are explained.
+  size_t round = 0;  ///< Outlines of balls and tubes, which are not among the unexplained.
 };
 
 /// Places on the lines between neighbouring pixels' centres where what is seen changes by more
 /// than `least_step` grey levels, to 1e-5 px. Where explained(a, b) holds, all places between a and
 /// b are known and not looked for any closer.
+///
+/// Outlines of balls and tubes are no lines, however little they bend: where that of a ring turns
+/// from convex to concave it has no curvature over tens of pixels.
 Jumps findJumps(const Eye& eye, const Camera& camera, double least_step, const auto& explained) {
   /// Between lo and hi, shares of the way between two pixels' centres.
   struct Search {
@@ -414,6 +463,11 @@ Jumps findJumps(const Eye& eye, const Camera& camera, double least_step, const a
     const auto ray = camera.unproject(pixel);
     if (!ray) continue;
     ++jumps.count;
+    const Hit& front = isBefore(s.here.hit, s.there.hit) ? s.here.hit : s.there.hit;
+    if (front.kind == HitKind::kSphere || front.kind == HitKind::kTube) {
+      ++jumps.round;
+      continue;
+    }
     jumps.unexplained.push_back({pixel, *ray});
   }
   return jumps;
@@ -472,25 +526,44 @@ StraightRun longestStraightRun(const Camera& camera, const std::vector<Jump>& ju
   return longest;
 }
 
-/// Calls function(from, to) with pieces of the middles of bars' shadows, in the image, that
-/// something stands before. Such a shadow may show one of its borders, which has no label.
-void forHiddenShadowMiddles(const Viewed& seen, const Camera& camera, const auto& function) {
+/// Calls function(from, to) with pieces of the middles of thin bars and of bars' shadows, in the
+/// image, that something stands before (of a bar: other than itself). There, one of their borders
+/// may show, which has no label.
+void forHiddenMiddles(const Viewed& seen, const Camera& camera, const auto& function) {
   constexpr int kPieces = 400;
   const Vector3d& eye = seen.pose.position_in_world;
-  for (const Edge& edge : seen.scene.edges) {
-    if (edge.source != EdgeSource::kShadow ||
-        seen.scene.edges[static_cast<size_t>(edge.caster)].source != EdgeSource::kRodCentre) {
-      continue;
+  std::vector<char> is_thick(seen.scene.rods.size(), 0);  // Labelled by their sides.
+  for (const LabelLine& line : seen.labels.lines) {
+    const Edge& edge = seen.scene.edges[static_cast<size_t>(line.edge)];
+    if (edge.rod < 0 || edge.source == EdgeSource::kShadow || isMiddle(seen.scene, line)) continue;
+    is_thick[static_cast<size_t>(edge.rod)] = 1;
+  }
+  const auto isHidden = [&](const Edge& edge, const Vector3d& point) {
+    const double distance = (point - eye).norm();
+    const Eigen::Vector3f direction = ((point - eye) / distance).cast<float>();
+    const auto end = static_cast<float>(distance * (1 - 1e-4));
+    for (float begin = 0; begin < end;) {
+      const Hit hit = seen.raycaster.cast(eye.cast<float>(), direction, begin, end);
+      if (hit.kind == HitKind::kNothing) return false;
+      const bool is_own =
+          edge.source == EdgeSource::kRodCentre && isOnRod(hit, seen.scene, edge.rod);
+      if (!is_own) return true;
+      begin = hit.distance * (1 + 1e-6F);
     }
+    return false;
+  };
+  for (const Edge& edge : seen.scene.edges) {
+    const bool is_bar =
+        edge.source == EdgeSource::kRodCentre && is_thick[static_cast<size_t>(edge.rod)] == 0;
+    const bool is_shadow =
+        edge.source == EdgeSource::kShadow &&
+        seen.scene.edges[static_cast<size_t>(edge.caster)].source == EdgeSource::kRodCentre;
+    if (!is_bar && !is_shadow) continue;
     std::optional<Vector2d> before;
     for (int k = 0; k <= kPieces; ++k) {
       const Vector3d point = edge.from + (edge.to - edge.from) * k / kPieces;
-      const double distance = (point - eye).norm();
-      const Eigen::Vector3f direction = ((point - eye) / distance).cast<float>();
-      const Hit hit = seen.raycaster.cast(
-          eye.cast<float>(), direction, 0, static_cast<float>(distance * (1 - 1e-4)));
       std::optional<Vector2d> pixel;
-      if (hit.kind != HitKind::kNothing) pixel = camera.project(seen.pose.toCam(point));
+      if (isHidden(edge, point)) pixel = camera.project(seen.pose.toCam(point));
       if (pixel && before) function(*before, *pixel);
       before = pixel;
     }
@@ -501,6 +574,7 @@ void forHiddenShadowMiddles(const Viewed& seen, const Camera& camera, const auto
 // Borders are found by rays between neighbouring pixels, without the scene's edges.
 TEST(SynthSuite, LabelsAreComplete) {
   Worst worst("px, longest straight border without a label");
+  size_t jumps_seen = 0, round_seen = 0;
   holds(1, [&] {
     const Case c = *genCase();
     const Camera camera = *genSmallCamera({160, 240});
@@ -537,7 +611,7 @@ TEST(SynthSuite, LabelsAreComplete) {
     Jumps jumps = findJumps(eye, camera, 5, explained);
     StraightRun run = longestStraightRun(camera, jumps.unexplained);
     if (!(run.length_px < kLongPx)) {
-      forHiddenShadowMiddles(seen, camera, [&](const Vector2d& a, const Vector2d& b) {
+      forHiddenMiddles(seen, camera, [&](const Vector2d& a, const Vector2d& b) {
         if (!((a - b).norm() < 8)) return;
         pieces.forEachCell(a.cwiseMin(b), a.cwiseMax(b), 2, [&](auto& list) {
           list.push_back({a, b, kInBarPx});
@@ -547,14 +621,19 @@ TEST(SynthSuite, LabelsAreComplete) {
                     [&](const Jump& jump) { return explained(jump.pixel, jump.pixel); });
       run = longestStraightRun(camera, jumps.unexplained);
     }
-    RC_LOG() << jumps.count << " jumps, " << jumps.unexplained.size()
-             << " without a label; longest run " << run.length_px << " px from "
-             << run.from.transpose() << " to " << run.to.transpose();
+    RC_LOG() << jumps.count << " jumps, " << jumps.round << " of balls and tubes, "
+             << jumps.unexplained.size() << " without a label; longest run " << run.length_px
+             << " px from " << run.from.transpose() << " to " << run.to.transpose();
     RC_TAG(c.preset);
     RC_PRE(jumps.count > 0);
+    jumps_seen += jumps.count;
+    round_seen += jumps.round;
     worst.see(run.length_px);
     RC_ASSERT(run.length_px < kLongPx);
   });
+  std::cout << "    outlines of balls and tubes: " << round_seen << " of " << jumps_seen
+            << " jumps\n";
+  EXPECT_LE(round_seen, jumps_seen / 20);
 }
 
 // What two cameras of one pose both see entirely are the same arcs.
@@ -649,24 +728,38 @@ struct WorldMap {
   }
 };
 
-void expectSameLabels(const Labels& a, const Labels& b, const auto& mapPixel) {
+/// `map` takes places in the camera frame of `a` to that of `b`.
+void expectSameLabels(
+    const Labels& a, const Labels& b, const Camera& camera, const auto& map, const auto& mapPixel) {
   RC_ASSERT(a.lines.size() == b.lines.size());
-  size_t other_contrast = 0;
+  size_t other_contrast = 0, other_end = 0;
   for (size_t i = 0; i < a.lines.size(); ++i) {
     const LabelLine &p = a.lines[i], &q = b.lines[i];
     RC_ASSERT(p.edge == q.edge);
     RC_ASSERT(p.kind == q.kind);
     RC_ASSERT(p.ends == q.ends);
-    RC_ASSERT(std::abs(p.angle_rad - q.angle_rad) <= 1e-9);
     // Where something begins 2e-4 rad from the line, one of its places depends on the last bit.
     const double difference = std::abs(p.contrast - q.contrast);
     RC_ASSERT(difference <= 0.5 + 255.0 / kContrastPlaces);
     other_contrast += difference <= 0.5 + 0.1 * p.contrast ? 0 : 1;
-    RC_ASSERT((mapPixel(p.points.front()) - q.points.front()).norm() <= 1e-5);
-    RC_ASSERT((mapPixel(p.points.back()) - q.points.back()).norm() <= 1e-5);
+    for (size_t end = 0; end < 2; ++end) {
+      const Vector3d& place = p.points_in_cam[end];
+      const double off_rad = angleTo(map(place), q.points_in_cam[end]);
+      // Of two places at which a line may end that are nearer to each other than floats resolve, a
+      // ray test between them chooses by its last bit.
+      RC_ASSERT(off_rad <= kShortestSpanRad);
+      other_end += off_rad <= 1e-9 ? 0 : 1;
+      const auto J = camera.jacobian(place);
+      const double off_px = J ? J->norm() * place.norm() * off_rad : 0;
+      const auto& from = end == 0 ? p.points.front() : p.points.back();
+      const auto& to = end == 0 ? q.points.front() : q.points.back();
+      RC_ASSERT((mapPixel(from) - to).norm() <= 1e-5 + off_px);
+    }
   }
-  RC_LOG() << other_contrast << " of " << a.lines.size() << " labels have another contrast\n";
+  RC_LOG() << other_contrast << " of " << a.lines.size() << " labels have another contrast, "
+           << other_end << " ends are elsewhere\n";
   RC_ASSERT(other_contrast <= 1 + a.lines.size() / 200);
+  RC_ASSERT(other_end <= 1 + a.lines.size() / 200);
   RC_ASSERT(a.junctions.size() == b.junctions.size());
 }
 
@@ -685,7 +778,8 @@ TEST(SynthSuite, TurningSceneAndCameraChangesNothing) {
     turned_pose.position_in_world = turn(view.pose.position_in_world);
     const Viewed seen(view.scene, view.pose, camera),
         turned(turn.of(view.scene), turned_pose, camera);
-    expectSameLabels(seen.labels, turned.labels, [](const Vector2d& p) { return p; });
+    const auto same = [](const auto& p) { return p; };
+    expectSameLabels(seen.labels, turned.labels, camera, same, same);
     const std::vector<float> image = seen.render(camera), turned_image = turned.render(camera);
     size_t differ = 0;
     for (size_t i = 0; i < image.size(); ++i) {
@@ -723,9 +817,14 @@ TEST(SynthSuite, MirroredScenesAreMirrored) {
     const Camera other = mirrored(camera);
     const Viewed seen(view.scene, view.pose, camera), flipped(mirror.of(view.scene), pose, other);
     const int width = camera.width();
-    expectSameLabels(seen.labels, flipped.labels, [&](const Vector2d& p) -> Vector2d {
-      return {width - 1 - p.x(), p.y()};
-    });
+    expectSameLabels(
+        seen.labels,
+        flipped.labels,
+        camera,
+        [&](const Vector3d& p) -> Vector3d { return flip * p; },
+        [&](const Vector2d& p) -> Vector2d {
+          return {width - 1 - p.x(), p.y()};
+        });
     // Samples are not mirrored: pixels agree as well as 64 samples answer.
     const std::vector<float> image = seen.render(camera), flipped_image = flipped.render(other);
     size_t differ = 0;

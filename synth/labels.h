@@ -21,6 +21,8 @@
 namespace dlsd {
 
 /// Spans and gaps shorter than this (rad) are dropped and closed: 5e-4 px in a 500 px/rad camera.
+/// Where two places at which something may change are that near to each other, a span may end at
+/// either: rays of floats do not see what is in between.
 inline constexpr double kShortestSpanRad = 1e-6;
 
 /// A rod is labelled by its centre line (`wire`) in a view in which it is nowhere thicker than
@@ -54,8 +56,8 @@ struct Labels {
 /// Rods: the width in px, 2 * radius seen across the centre line, is taken at 17 points of each
 /// imaged piece of the centre line (hidden or not); if the largest is >= kThickRodPx, or nothing of
 /// the centre line is in the image, the rod is labelled by its prism edges, else by its centre
-/// line. A rod's shadow on a face likewise: by its borders or its middle; then it has no label
-/// where the middle is hidden, though a border may show.
+/// line. A rod's shadow on a face likewise: by its borders or its middle. What is labelled by its
+/// middle has no label where that is hidden, though a border may show.
 ///
 /// Kind: decal borders are `material`, centre lines `wire`, borders of shadows `shadow` (present if
 /// the scene's edges hold them, see shadows.h). An edge of two faces is `crease` if

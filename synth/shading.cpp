@@ -225,7 +225,6 @@ void Shader::castShadow(
   size_t rays = 0;
   for (size_t i = 0; i < count; ++i) {
     if (sights[i] < 0) continue;
-    constexpr double kSunDistance = 64;  // m; scenes are smaller.
     const bool sun = light.kind == Light::Kind::kSun;
     const Eigen::Vector3d from =
         sun ? Eigen::Vector3d(places[i].point + kSunDistance * light.place) : light.place;
@@ -233,8 +232,7 @@ void Shader::castShadow(
     const Eigen::Vector3d way = places[i].point - start.cast<double>();
     const double distance = way.norm(), cosine = -places[i].normal.dot(way) / distance;
     if (!(cosine > 1e-4)) continue;  // It gets no light from there anyway.
-    // The caster's float rounding, which counts the more the flatter the light falls.
-    const double margin = 1e-5 + 1e-6 * distance / cosine;
+    const double margin = shadowGap(distance, cosine);
     if (!(distance > margin)) continue;
     packet.origin_x[rays] = start.x();
     packet.origin_y[rays] = start.y();

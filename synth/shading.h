@@ -32,6 +32,17 @@ struct Seen {
                                 const Eigen::Vector3d& point,
                                 const Eigen::Vector3d& normal);
 
+/// Suns shine from this far, m; scenes are smaller.
+inline constexpr double kSunDistance = 64;
+
+/// What stands nearer than this before a place, m along the light, casts no shadow on it: for the
+/// ray caster's float rounding, which counts the more the flatter the light falls. At grazing light
+/// the shadows of what stands on a face begin up to a few mm beside it. `distance`: to the light;
+/// `cosine`: of the light's angle to the normal.
+[[nodiscard]] inline double shadowGap(double distance, double cosine) {
+  return 1e-5 + 1e-6 * distance / cosine;
+}
+
 /// Immutable; may be used by many threads. The scene must outlive it.
 class Shader {
  public:

@@ -8,6 +8,7 @@
 
 #include "cameras/mutant.h"
 #include "synth/scene_builder.h"
+#include "synth/shading.h"
 #include "synth/tubes.h"
 
 namespace dlsd {
@@ -297,7 +298,6 @@ class LightView {
   /// The face or disc onto which a point of the edge casts its shadow; nothing if the point is in
   /// the dark, stands on the face behind it, or has something curved or nothing behind it.
   [[nodiscard]] Hit planeBehind(const Edge& edge, const Vector3d& point) const {
-    constexpr double kSunDistance = 64;  // m, as in Shader.
     const Vector3d start =
         roundToFloat(isSun() ? Vector3d(point + kSunDistance * light_.place) : light_.place);
     const Vector3d way = point - start;
