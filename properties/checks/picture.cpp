@@ -96,9 +96,17 @@ double contrastAlong(const std::vector<float>& grey, const Camera& camera, const
 /// Whether the picture shows an edge 12 px beyond one of the line's ends, too, such as a fainter
 /// one: then it is chance where the line ends.
 bool goesOn(const std::vector<float>& grey, const Camera& camera, const DetectedLine& line) {
-  constexpr double kBeyondPx = 12, kBesidePx = 2, kLevels = 4;
-  const double beyond = kBeyondPx / line.length_px;
-  for (const double t : {-beyond, 1 + beyond}) {
+  constexpr double kBesidePx = 2, kLevels = 4;
+  const auto isInside = [&](double t) {
+    const auto p = camera.project(line.arc.at(t));
+    return p && camera.inImage(*p);
+  };
+  for (const bool at_from : {true, false}) {
+    // Or nearer, if that is beyond the border.
+    const auto shareAt = [&](double px) {
+      return at_from ? -px / line.length_px : 1 + px / line.length_px;
+    };
+    const double t = isInside(shareAt(12)) ? shareAt(12) : shareAt(6);
     const auto p = camera.project(line.arc.at(t)), q = camera.project(line.arc.at(t + 0.01));
     if (!p || !q || !camera.inImage(*p)) continue;
     const Vector2d along = (*q - *p).normalized();
@@ -883,7 +891,11 @@ std::optional<std::string> defectOf(const Camera& camera,
     if (camera.project(line.arc.to) != line.to_px) return "an end that is not its ray's pixel";
     if (!camera.inImage(line.from_px) || !camera.inImage(line.to_px)) return "an end off the image";
     if (!(line.rms_px <= line.max_px)) return "rms > max";
-    if (!(line.max_px <= 2 * options.validation.rho_px)) return "a residual of more than 2 rho";
+    // The paper looks at the ends of straight pieces only.
+    if (options.method == DetectorOptions::Method::kPlanarPieces &&
+        !(line.max_px <= 2 * options.validation.rho_px)) {
+      return "a residual of more than 2 rho";
+    }
     if (!(line.length_px > 0)) return "no length";
     if (line.polarity != 1 && line.polarity != -1) return "no polarity";
     if (!(line.score <= previous_score)) return "scores that rise";
