@@ -247,7 +247,7 @@ bool isInShadowGap(const Viewed& seen, const LabelLine& line, const Vector3d& po
 // or, where the next border is nearer than that, less; 2e-4 rad off, grey levels differ by its
 // least contrast.
 TEST(SynthSuite, LabelsLieOnDiscontinuities) {
-  long points_seen = 0, gaps_seen = 0;
+  long points_seen = 0, gaps_seen = 0, ends_seen = 0;
   holds(1, [&] {
     const Case c = *genCase();
     const Camera camera = *genSmallCamera();
@@ -259,6 +259,11 @@ TEST(SynthSuite, LabelsLieOnDiscontinuities) {
       if (isMiddle(seen.scene, line) || line.contrast_min < 3) continue;
       // One of the places at which contrast is stated, through the image.
       const double phi = line.angle_rad * (line.id % kContrastPlaces + 0.5) / kContrastPlaces;
+      // At an end, what is beyond it may be there, too.
+      if (std::min(phi, line.angle_rad - phi) < 2 * kShortestSpanRad) {
+        ++ends_seen;
+        continue;
+      }
       const Vector3d point = pointAt(line, phi);
       if (isInShadowGap(seen, line, point)) {
         ++in_gap;
@@ -292,9 +297,9 @@ TEST(SynthSuite, LabelsLieOnDiscontinuities) {
     RC_TAG(c.preset);
     RC_ASSERT(flat == 0);
   });
-  std::cout << "    in the gap between a shadow and what casts it: " << gaps_seen << ", elsewhere "
-            << points_seen << " points\n";
-  EXPECT_LE(gaps_seen, points_seen / 1000);
+  std::cout << "    in the gap between a shadow and what casts it: " << gaps_seen
+            << ", at ends: " << ends_seen << ", elsewhere " << points_seen << " points\n";
+  EXPECT_LE(gaps_seen + ends_seen, points_seen / 1000);
 }
 
 // A point of an edge is in a span if and only if brute force over all triangles and round things
