@@ -61,6 +61,7 @@ TEST_P(EfficiencySuite, PlanesAreKnownNearlyAsWellAsNoiseAllows) {
       RC_ASSERT(beyond <= kSideBiasPx);
     }
   });
+  if (HasFailure()) return;  // Shrinking has added to the sums.
   ASSERT_GE(all.found, 50);
   const double offset = std::sqrt(all.offset2 / all.found), roll = std::sqrt(all.roll2 / all.found);
   const double bias_px = all.bias_px / all.found;

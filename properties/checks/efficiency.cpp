@@ -87,24 +87,26 @@ std::vector<SideErrors> sideErrors(const EfficiencyCase& c) {
     if (!ray) return {};
     rays.push_back(*ray);
   }
-  // Seen from inside, corners go round the axis so that the normals of the sides point inwards.
+  // Seen from inside, corners go round so that the normals of the sides point inwards.
+  if (rays[0].cross(rays[1]).dot(rays[2]) < 0) std::reverse(rays.begin(), rays.end());
+  // The image of a polygon is one of great circles only if all its corners are on its sides. Then
+  // they are in the hemisphere round the sum of the normals, too: round the sum of the corners a
+  // polygon of wide angles is not.
   Vector3d axis = Vector3d::Zero();
-  for (const Vector3d& ray : rays) axis += ray;
-  axis.normalize();
+  for (size_t i = 0; i < rays.size(); ++i) {
+    const Vector3d normal = rays[i].cross(rays[(i + 1) % rays.size()]).normalized();
+    for (const Vector3d& ray : rays) {
+      if (normal.dot(ray) < -1e-12) return {};
+    }
+    axis += normal;
+  }
   const double sign = random.uniform(5, -1, 1) < 0 ? -1 : 1;
   test::Scene scene;
   scene.background = 128 - sign * c.contrast / 2;
   test::Shape shape;
-  shape.axis = axis;
+  shape.axis = axis.normalized();
   shape.grey = 128 + sign * c.contrast / 2;
-  if (rays[0].cross(rays[1]).dot(axis) < 0) std::reverse(rays.begin(), rays.end());
   shape.vertices = rays;
-  for (size_t i = 0; i < rays.size(); ++i) {
-    // The image of a polygon is one of great circles only if all its corners are on its sides.
-    for (const Vector3d& ray : rays) {
-      if (rays[i].cross(rays[(i + 1) % rays.size()]).dot(ray) < -1e-12) return {};
-    }
-  }
   scene.shapes.push_back(shape);
 
   std::vector<Side> sides;
