@@ -239,9 +239,10 @@ double EdgeMapper::measureNoise(const GreyPixels& pixels, const BitRows& usable)
   constexpr int kColumnStep = 3;
   std::fill(histogram_.begin(), histogram_.end(), 0);
   const size_t count = words_per_row_ * 64;
-  const int step = std::max(1, height_ / kRows);
+  const PixelBox where = usable.bounds();
+  const int step = std::max(1, where.height() / kRows);
   int total = 0;
-  for (int y = step / 2; y < height_; y += step) {
+  for (int y = where.y0 + step / 2; y < where.y1; y += step) {
     for (int dy = -3; dy <= 3; ++dy) {
       const int row = y + dy;
       if (row >= 0 && row < height_) loadRow(pixels, row);
@@ -255,7 +256,7 @@ double EdgeMapper::measureNoise(const GreyPixels& pixels, const BitRows& usable)
       kernels_.smoothAcross(rows, count + 1, &corners_[static_cast<size_t>(side) * padded_]);
     }
     kernels_.gradient(&corners_[0], &corners_[padded_], count, &gx_[0], &gy_[0], &magnitude_[0]);
-    for (int x = y % kColumnStep; x < width_; x += kColumnStep) {
+    for (int x = where.x0 + (y - where.y0) % kColumnStep; x < where.x1; x += kColumnStep) {
       if (!usable.test(x, y)) continue;
       ++histogram_[static_cast<size_t>(magnitude_[static_cast<size_t>(x)] >> kShift)];
       ++total;

@@ -80,10 +80,12 @@ void LineTracer::measureNoise() {
   std::array<std::array<float, 2 * kColumns * kWindowRows>, 4> values;
   size_t count = 0;
   std::array<EdgeResponse, EdgeProfiler::kRows> rows;
+  // An image circle may be a small part of the image.
+  const PixelBox where = usable_->bounds();
   for (int j = 0; j < kWindowRows; ++j) {
     for (int i = 0; i < kColumns; ++i) {
-      const int x = (2 * i + 1) * pixels_.width / (2 * kColumns);
-      const int y = (2 * j + 1) * pixels_.height / (2 * kWindowRows);
+      const int x = where.x0 + (2 * i + 1) * where.width() / (2 * kColumns);
+      const int y = where.y0 + (2 * j + 1) * where.height() / (2 * kWindowRows);
       if (!usable_->contains(x, y) || !usable_->contains(x - 8, y) ||
           !usable_->contains(x + 8, y) || !usable_->contains(x, y + 7)) {
         continue;

@@ -1,6 +1,7 @@
 #include "detector/usable_mask.h"
 
 #include <algorithm>
+#include <bit>
 
 #include "cameras/batch.h"
 #include "cameras/mutant.h"
@@ -23,6 +24,29 @@ void distanceAlong(const uint8_t* set, uint8_t* distance, int count, uint8_t far
 }
 
 }  // namespace
+
+PixelBox BitRows::bounds() const {
+  PixelBox box;
+  const auto isSet = [](uint64_t word) { return word != 0; };
+  const auto isEmpty = [&](int y) { return std::none_of(row(y), row(y) + words_per_row, isSet); };
+  while (box.y0 < height && isEmpty(box.y0)) ++box.y0;
+  if (box.y0 == height) return {};
+  for (box.y1 = height; isEmpty(box.y1 - 1);) --box.y1;
+  // Column by column of words.
+  uint64_t all = 0;
+  const auto columnOf = [&](size_t word) {
+    all = 0;
+    for (int y = box.y0; y < box.y1; ++y) all |= row(y)[word];
+    return all;
+  };
+  size_t word = 0;
+  while (columnOf(word) == 0) ++word;
+  box.x0 = static_cast<int>(64 * word) + std::countr_zero(all);
+  word = words_per_row - 1;
+  while (columnOf(word) == 0) --word;
+  box.x1 = static_cast<int>(64 * word) + 64 - std::countl_zero(all);
+  return box;
+}
 
 UsableMask::UsableMask(const Camera& camera) : bits_(camera.width(), camera.height()) {
   const int width = camera.width(), height = camera.height();

@@ -9,6 +9,13 @@
 
 namespace dlsd {
 
+/// Pixels x0 <= x < x1, y0 <= y < y1.
+struct PixelBox {
+  int x0 = 0, y0 = 0, x1 = 0, y1 = 0;
+  [[nodiscard]] int width() const { return x1 - x0; }
+  [[nodiscard]] int height() const { return y1 - y0; }
+};
+
 /// One bit per pixel; rows start on whole words, the bits beyond a row's end are 0.
 struct BitRows {
   int width = 0, height = 0;
@@ -41,6 +48,8 @@ struct BitRows {
   void clear(int x, int y) {
     row(y)[static_cast<unsigned>(x) / 64] &= ~(uint64_t{1} << (static_cast<unsigned>(x) % 64));
   }
+  /// The smallest box with all that is set; empty at (0, 0) if nothing is.
+  [[nodiscard]] PixelBox bounds() const;
 };
 
 class UsableMask {

@@ -33,5 +33,28 @@ TEST(UsableMask, TinyImagesHaveNoUsablePixel) {
   }
 }
 
+TEST(BitRows, BoundsHoldAllThatIsSet) {
+  uint64_t k = 0;
+  const auto below = [&](int n) { return static_cast<int>(n * test::uniform(7, k++)); };
+  for (int i = 0; i < 2000; ++i) {
+    BitRows bits(1 + below(200), 1 + below(9));
+    PixelBox expected{bits.width, bits.height, 0, 0};
+    const int count = below(4);
+    for (int n = 0; n < count; ++n) {
+      const int x = below(bits.width), y = below(bits.height);
+      bits.set(x, y);
+      expected = {std::min(expected.x0, x),
+                  std::min(expected.y0, y),
+                  std::max(expected.x1, x + 1),
+                  std::max(expected.y1, y + 1)};
+    }
+    if (count == 0) expected = {};
+    const PixelBox box = bits.bounds();
+    ASSERT_EQ((std::array{box.x0, box.y0, box.x1, box.y1}),
+              (std::array{expected.x0, expected.y0, expected.x1, expected.y1}))
+        << bits.width << " x " << bits.height;
+  }
+}
+
 }  // namespace
 }  // namespace dlsd
