@@ -291,7 +291,7 @@ std::optional<std::string> dataFrom(const fs::path& out, const fs::path& data) {
   return std::nullopt;
 }
 
-/// What the dataset shows: "room" of its preset's version "room/1"; empty if its manifest does not
+/// What the dataset shows: "room" of its preset's version "room/2"; empty if its manifest does not
 /// say.
 std::string sceneOf(const ordered_json& manifest) {
   const auto config = manifest.find("config");

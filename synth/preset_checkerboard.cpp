@@ -52,7 +52,8 @@ SceneView makeCheckerboard(uint64_t seed, uint64_t index) {
   const Vector3d hall(8, 8, 4);
   std::array<Panel, 4> walls;
   for (Panel& wall : walls) wall.surface = {random.next(0.25, 0.7), 0};
-  builder.addRoom(hall, walls, {random.next(0.15, 0.5), 0}, {random.next(0.4, 0.8), 0});
+  const Surface ceiling{random.next(0.4, 0.8), 0};
+  builder.addRoom(hall, walls, {random.next(0.15, 0.5), 0}, ceiling);
 
   const Vector3d eye = roundToFloat(
       hall / 2 + Vector3d{random.next(-0.5, 0.5), random.next(-0.5, 0.5), random.next(-0.3, 0.3)});

@@ -34,7 +34,8 @@ Pocket drawDoor(double x, double width, double height, Random* random) {
 SceneView makeCorridor(uint64_t seed, uint64_t index) {
   Random random(hashCounters({seed, index}), kStream);
   SceneBuilder builder;
-  const Vector3d size(random.next(11, 15.5), random.next(1.8, 3.2), random.next(2.4, 3.2));
+  const double room_height = random.next(2.4, 3.2), room_width = random.next(1.8, 3.2);
+  const Vector3d size(random.next(11, 15.5), room_width, room_height);
   std::array<Panel, 4> walls;
   const double paint = random.next(0.4, 0.8);
   const double door_height = random.next(2, 2.15), door_width = random.next(0.8, 1.1);
@@ -111,9 +112,10 @@ SceneView makeCorridor(uint64_t seed, uint64_t index) {
     scene.lights.push_back(lamp);
   }
 
-  const Vector3d eye(at, size.y() * random.next(0.35, 0.65), random.next(1.2, 1.8));
-  const double yaw = random.next(-0.45, 0.45) + (random.nextBool(0.5) ? M_PI : 0);
-  const double pitch = random.next(-0.3, 0.2);
+  const double eye_height = random.next(1.2, 1.8);
+  const Vector3d eye(at, size.y() * random.next(0.35, 0.65), eye_height);
+  const double turn = random.next(-0.45, 0.45);
+  const double yaw = turn + (random.nextBool(0.5) ? M_PI : 0), pitch = random.next(-0.3, 0.2);
   const Vector3d ahead(
       std::cos(yaw) * std::cos(pitch), std::sin(yaw) * std::cos(pitch), std::sin(pitch));
   SceneView view;

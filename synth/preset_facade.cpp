@@ -80,7 +80,8 @@ SceneView makeFacade(uint64_t seed, uint64_t index) {
         faces[4].front,
         {DecalShape::kRectangle, {size.x() / 2, y}, {size.x() / 2 - 0.1, seam / 2}, 0, dark});
   }
-  const Vector3d eye(random.next(4, 12), random.next(5, 11), random.next(1.2, 5));
+  const double eye_height = random.next(1.2, 5), eye_distance = random.next(5, 11);
+  const Vector3d eye(random.next(4, 12), eye_distance, eye_height);
   for (int k = 0; k < 5; ++k) {
     const double x = 0.8 + 3 * k + random.next(0, 1), y = random.next(1.6, 3.5);
     const double height_k = random.next(0.4, 2.2), w = random.next(0.3, 1.2);
@@ -96,13 +97,14 @@ SceneView makeFacade(uint64_t seed, uint64_t index) {
   scene.ambient_up = random.next(0.35, 0.5);
   scene.ambient_down = random.next(0.25, 0.35);
   Light sun;
-  sun.place =
-      Vector3d(random.next(-1, 1), random.next(0.4, 1.2), random.next(0.4, 1.5)).normalized();
+  const double sun_z = random.next(0.4, 1.5), sun_y = random.next(0.4, 1.2);
+  sun.place = Vector3d(random.next(-1, 1), sun_y, sun_z).normalized();
   sun.strength = random.next(0.5, 0.8);
   sun.casts_shadows = random.nextBool(0.8);
   scene.lights.push_back(sun);
 
-  const Vector3d target(random.next(4, 12), 0, random.next(2, 7));
+  const double target_height = random.next(2, 7);
+  const Vector3d target(random.next(4, 12), 0, target_height);
   SceneView view;
   view.pose = lookAt(eye, target, random.next(-0.15, 0.15));
   view.scene = std::move(scene);

@@ -33,7 +33,8 @@ SceneView makePolyhedra(uint64_t seed, uint64_t index) {
   std::array<Panel, 4> walls;
   const double sky = random.next(0.15, 0.9);
   for (Panel& wall : walls) wall.surface = {sky * random.next(0.8, 1.2), 0};
-  builder.addRoom(hall, walls, {random.next(0.1, 0.6), 0}, {sky * random.next(0.8, 1.2), 0});
+  const Surface ceiling{sky * random.next(0.8, 1.2), 0};
+  builder.addRoom(hall, walls, {random.next(0.1, 0.6), 0}, ceiling);
 
   const Vector3d eye = drawEyeNear(hall / 2, &random);
   std::vector<Cone> cones;

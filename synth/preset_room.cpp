@@ -672,7 +672,9 @@ class RoomMaker {
     const Surface wood = paint(0.12, 0.75);
     const double top = random_.next(0.02, 0.045);
     const SlabFaces board = builder_.addBox(*f, {0, 0, size.z() - top}, size, wood);
-    addLegs(*f, size, top, random_.next(0.035, 0.07), random_.next(0.012, 0.06), near(wood, 0.3));
+    const Surface leg_paint = near(wood, 0.3);
+    const double leg_inset = random_.next(0.012, 0.06);
+    addLegs(*f, size, top, random_.next(0.035, 0.07), leg_inset, leg_paint);
     if (random_.nextBool(0.5)) {
       addTopThings(*f, size);
       return;

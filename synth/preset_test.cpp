@@ -73,17 +73,17 @@ class SceneText {
 };
 
 // If this fails, seeds give other scenes than before and every dataset, figure and counter-example
-// made from them means something else: give the preset a new version number ("room/2") together
+// made from them means something else: give the preset a new version number ("room/3") together
 // with the new hash, or undo the change.
 TEST(Presets, AreFrozen) {
   const std::map<std::string, std::string> golden{
-      {"room/1", "696f0c889ec57beab9896897de4688e319af69d6977ddcb648e9bf610fc39bc9"},
-      {"paper/1", "82e168e233c851f9de6825822fd29cbccd8d0409029fafd4ae1b25652d15b196"},
-      {"polyhedra/1", "5cef4e0597b15b47e96a2d43e68e1cd3779039200499c91975e987b7c2fda9ee"},
-      {"wires/1", "5aeb4a213c2b35dcc828cdfb4dd4b4369d683762b0179fdbb53561eac3b2710c"},
-      {"corridor/1", "039c248772c695078e0fd715cd5f67697fd63051b882c0b8f700344a251620c2"},
-      {"facade/1", "4a5497cb2f5dd6a676dba3eed006034c09a40827acc1ed8e49a19bd7562cefc1"},
-      {"checkerboard/1", "0f56396493ae6e8f70b6298e13753e9aaafe5325bcfe308f3c993842b79819e5"},
+      {"room/2", "696f0c889ec57beab9896897de4688e319af69d6977ddcb648e9bf610fc39bc9"},
+      {"paper/2", "82e168e233c851f9de6825822fd29cbccd8d0409029fafd4ae1b25652d15b196"},
+      {"polyhedra/2", "40100d284b41bce29366e969ee8e0244152694366f7c31de731e94dd2acf6b0c"},
+      {"wires/2", "1eca6861e84a1de4bae6b922f54621a16fff1967ba495a1e4c29d188dd16d52f"},
+      {"corridor/2", "039c248772c695078e0fd715cd5f67697fd63051b882c0b8f700344a251620c2"},
+      {"facade/2", "4a5497cb2f5dd6a676dba3eed006034c09a40827acc1ed8e49a19bd7562cefc1"},
+      {"checkerboard/2", "2e28e52e6f656dc6de56558851df6107ac41038496595675a70f9099d4ce6643"},
   };
   ASSERT_EQ(golden.size(), scenePresets().size());
   for (const std::string& preset : scenePresets()) {

@@ -72,7 +72,8 @@ SceneView makeWires(uint64_t seed, uint64_t index) {
   const double wall = dark_hall ? random.next(0.05, 0.2) : random.next(0.5, 0.9);
   std::array<Panel, 4> walls;
   for (Panel& panel : walls) panel.surface = {wall * random.next(0.8, 1.1), 0};
-  builder.addRoom(hall, walls, {wall * random.next(0.6, 1), 0}, {wall * random.next(0.8, 1.1), 0});
+  const Surface ceiling{wall * random.next(0.8, 1.1), 0};
+  builder.addRoom(hall, walls, {wall * random.next(0.6, 1), 0}, ceiling);
 
   const Vector3d eye = drawEyeNear(hall / 2, &random);
   std::vector<Ball> balls;

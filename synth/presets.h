@@ -7,13 +7,13 @@
 
 namespace dlsd {
 
-inline constexpr std::string_view kRoomVersion = "room/1";
-inline constexpr std::string_view kPaperVersion = "paper/1";
-inline constexpr std::string_view kPolyhedraVersion = "polyhedra/1";
-inline constexpr std::string_view kWiresVersion = "wires/1";
-inline constexpr std::string_view kCorridorVersion = "corridor/1";
-inline constexpr std::string_view kFacadeVersion = "facade/1";
-inline constexpr std::string_view kCheckerboardVersion = "checkerboard/1";
+inline constexpr std::string_view kRoomVersion = "room/2";
+inline constexpr std::string_view kPaperVersion = "paper/2";
+inline constexpr std::string_view kPolyhedraVersion = "polyhedra/2";
+inline constexpr std::string_view kWiresVersion = "wires/2";
+inline constexpr std::string_view kCorridorVersion = "corridor/2";
+inline constexpr std::string_view kFacadeVersion = "facade/2";
+inline constexpr std::string_view kCheckerboardVersion = "checkerboard/2";
 
 /// A furnished room, another one for each (seed, index), seen from somewhere inside.
 [[nodiscard]] SceneView makeRoom(uint64_t seed, uint64_t index);

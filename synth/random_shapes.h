@@ -21,7 +21,8 @@ namespace dlsd {
 
 /// By any angle about any axis.
 [[nodiscard]] inline Eigen::Matrix3d drawRotation(Random* random) {
-  return Eigen::AngleAxisd(random->next(0, 2 * M_PI), drawDirection(random)).toRotationMatrix();
+  const Eigen::Vector3d axis = drawDirection(random);
+  return Eigen::AngleAxisd(random->next(0, 2 * M_PI), axis).toRotationMatrix();
 }
 
 /// A viewpoint within 0.4 m of a place, along each axis.

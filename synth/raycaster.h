@@ -42,6 +42,14 @@ struct RayPacket {
   alignas(64) std::array<float, kSize> min_distance, max_distance;
 };
 
+/// A float point near i / pieces of the way from `from` to `to` and as near to that line as can be
+/// had (where the caster cuts an edge in pieces): of 16 tried the one that rounding moves least off
+/// the line, on average a quarter as far as any one of them.
+[[nodiscard]] Eigen::Vector3f floatPointOnEdge(const Eigen::Vector3d& from,
+                                               const Eigen::Vector3d& to,
+                                               int i,
+                                               int pieces);
+
 /// Immutable after construction; may be used by many threads at once. The scene must outlive it.
 class Raycaster {
  public:

@@ -16,10 +16,14 @@ Eigen::Matrix4d Pose::matrix() const {
 }
 
 Eigen::Vector3d roundToFloat(const Eigen::Vector3d& p) {
-  // Through a variable: GCC 12 at -O3 leaves the rounding out of x.cast<float>().cast<double>()
-  // where x is an Eigen expression.
-  const Eigen::Vector3f rounded = p.cast<float>();
-  return rounded.cast<double>();
+  // GCC 12 from -O2 on vectorises two conversions to float and back and drops them (the remaining
+  // one stays); what is volatile it must convert.
+  Eigen::Vector3d rounded;
+  for (int k = 0; k < 3; ++k) {
+    const volatile auto coordinate = static_cast<float>(p[k]);
+    rounded[k] = static_cast<double>(coordinate);
+  }
+  return rounded;
 }
 
 Pose lookAt(const Eigen::Vector3d& position, const Eigen::Vector3d& target, double roll_rad) {

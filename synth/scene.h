@@ -193,7 +193,7 @@ struct SceneView {
 
 /// Names of the presets.
 [[nodiscard]] const std::vector<std::string>& scenePresets();
-/// "room/1": changes whenever the same seed gives another scene.
+/// "room/2": changes whenever the same seed gives another scene.
 [[nodiscard]] std::string presetVersion(std::string_view preset);
 /// Frame `index` of a preset, a function of its arguments only. `paper`: one table per seed, index
 /// is time at 10 Hz along a smooth path; all others: another scene each index. Throws

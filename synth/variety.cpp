@@ -283,17 +283,19 @@ class Decorator {
       const Vector2d cell = size.cwiseQuotient(Vector2d(columns, rows));
       for (int j = 0; j < rows; ++j) {
         for (int i = 0; i < columns; ++i) {
-          const Vector2d half =
-              cell.cwiseProduct(Vector2d(random_.next(0.1, 0.4), random_.next(0.1, 0.4)));
-          addEllipse(face, cell.cwiseProduct(Vector2d(i + 0.5, j + 0.5)), half, ink);
+          const double half_y = random_.next(0.1, 0.4), half_x = random_.next(0.1, 0.4);
+          addEllipse(face,
+                     cell.cwiseProduct(Vector2d(i + 0.5, j + 0.5)),
+                     cell.cwiseProduct(Vector2d(half_x, half_y)),
+                     ink);
         }
       }
       return;
     }
     // Rings around a knot, each inside the one before.
     const int paper = scene_.faces[face].surface, rings = random_.nextInt(3, 12);
-    const Vector2d centre =
-        size.cwiseProduct(Vector2d(random_.next(0.4, 0.6), random_.next(0.4, 0.6)));
+    const double centre_y = random_.next(0.4, 0.6), centre_x = random_.next(0.4, 0.6);
+    const Vector2d centre = size.cwiseProduct(Vector2d(centre_x, centre_y));
     Vector2d half = 0.95 * centre.cwiseMin(size - centre);
     for (int k = 0; k < 2 * rings; ++k) {
       addEllipse(face, centre, half, k % 2 == 0 ? ink : paper);
