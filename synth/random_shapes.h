@@ -1,5 +1,8 @@
 #pragma once
 // Draws that several presets share.
+//
+// Here and in the presets no two draws are arguments of one call: C++ leaves their order open. (Of
+// the values in one pair of braces it does not.)
 
 #include <Eigen/Geometry>
 #include <cmath>

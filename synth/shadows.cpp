@@ -77,6 +77,7 @@ class LightView {
       const auto a = shadowOnPlane(light_, pointAt(edge, begin), plane);
       const auto b = shadowOnPlane(light_, pointAt(edge, end), plane);
       if (!a || !b || !((*a - *b).norm() > kShortest)) return;
+      if (border.face0 >= 0 && liesOnBorder(border.face0, *a, *b)) return;
       border.from = *a;
       border.to = *b;
       out->push_back(border);
@@ -269,6 +270,20 @@ class LightView {
     const Face& f = scene_.faces[static_cast<size_t>(face)];
     return std::abs(f.normal.dot(edge.from - f.origin)) < kInPlane &&
            std::abs(f.normal.dot(edge.to - f.origin)) < kInPlane;
+  }
+
+  /// Whether a segment lies along an edge in which the face ends: there, rounding decides which of
+  /// two faces a ray hits, and for how long.
+  [[nodiscard]] bool liesOnBorder(int face, const Vector3d& a, const Vector3d& b) const {
+    return std::any_of(scene_.edges.begin(), scene_.edges.end(), [&](const Edge& edge) {
+      if (edge.source != EdgeSource::kFaces || (edge.face0 != face && edge.face1 != face)) {
+        return false;
+      }
+      const Vector3d d = (edge.to - edge.from).normalized();
+      const double middle = d.dot((a + b) / 2 - edge.from);
+      return d.cross(a - edge.from).norm() < kInPlane && d.cross(b - edge.from).norm() < kInPlane &&
+             middle > 0 && middle < (edge.to - edge.from).norm();
+    });
   }
 
   /// Whether the light ends right here, at a face of something else on which the edge lies.

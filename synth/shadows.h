@@ -33,7 +33,7 @@ struct LitPlane {
 /// from the light, crosses another edge or the outline of a sphere, disc or tube, or enters a
 /// sphere. These places have closed forms (of tubes: see tubes.h); between two neighbours two ray
 /// tests decide: is the edge lit, and what lies behind it. What falls on round things is left out
-/// (no straight line, or no face).
+/// (no straight line, or no face), and what falls right onto an edge of the face behind.
 ///
 /// Carriers are not numbered.
 [[nodiscard]] std::vector<Edge> shadowEdges(const Scene& scene, const Raycaster& raycaster);

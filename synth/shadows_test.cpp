@@ -53,9 +53,8 @@ Scene clutteredRoom(const Light& light) {
   SceneBuilder builder = emptyRoom();
   builder.addBox(Frame3(), {2, 2, 1}, {3, 4, 1.5}, {0.7, 0});
   builder.addBox(Frame3(), {3.5, 1, 0}, {4.5, 2, 1}, {0.7, 0});
-  // Not up to x = 4.1: its shadow would end right in the border of the box below, where the dark
-  // top meets the dark side.
-  builder.addBox(Frame3(), {3.7, 1.2, 1}, {4, 1.6, 1.4}, {0.7, 0});
+  // One shadow of it falls right onto the border of the box below.
+  builder.addBox(Frame3(), {3.7, 1.2, 1}, {4.1, 1.6, 1.4}, {0.7, 0});
   Frame3 turned;
   turned.origin = {1.2, 4.3, 0.9};
   turned.axes = Eigen::AngleAxisd(0.7, Vector3d(1, 2, 3).normalized()).toRotationMatrix();
@@ -127,6 +126,30 @@ bool isDark(const Scene& scene, const Light& light, const Vector3d& point) {
 
 bool isMiddle(const Scene& scene, const Edge& edge) {
   return scene.edges[static_cast<size_t>(edge.caster)].source == EdgeSource::kRodCentre;
+}
+
+// Where a shadow falls right onto the border of a face, that border is the only edge: beside it the
+// face ends, so that the shadow parts nothing. Moved by less than rounding it is no other.
+TEST(ShadowEdges, AreNotOnBordersOfFaces) {
+  const double step = 1e-3;
+  for (const double beside : {-1e-6, -1e-7, -1e-9, 0.0, 1e-9, 1e-7, 1e-6, -step, step}) {
+    SceneBuilder builder = emptyRoom();
+    builder.addBox(Frame3(), {3.5, 1, 0}, {4.5, 2, 1}, {0.7, 0});
+    // The lamp stands at (2.2, 2.6, 3.3): the edge x = 4.1, z = 1.4 goes to x = 4.5 on z = 1.
+    builder.addBox(Frame3(), {3.7, 1.2, 1}, {4.1, 1.6, 1.4}, {0.7, 0});
+    builder.finish();
+    builder.scene.lights.push_back(lamp());
+    builder.scene.lights[0].place.x() -= beside;
+    const std::vector<Edge> shadows = shadowEdges(builder.scene, Raycaster(builder.scene));
+    int along = 0;
+    for (const Edge& e : shadows) {
+      const bool is_here = std::abs(e.from.x() - 4.5) < 0.1 && std::abs(e.to.x() - 4.5) < 0.1 &&
+                           std::abs(e.from.z() - 1) < 1e-5 && std::abs(e.to.z() - 1) < 1e-5;
+      if (is_here && std::abs(e.from.y() - e.to.y()) > 0.1) ++along;
+    }
+    // The shadow goes to x = 4.5 + 0.21 beside, which is on the box or beyond it.
+    EXPECT_EQ(along, beside == -step ? 1 : 0) << beside;
+  }
 }
 
 // On one side there is light, on the other there is none.
