@@ -211,7 +211,8 @@ TEST_P(PictureSuite, WithoutItsEmptyBorderAPictureHasTheSameLines) {
     picture_case.left = *genInt(16, 40);
     return picture_case;
   });
-  EXPECT_GE(tally.counted, 1);
+  EXPECT_GE(tally.counted, std::max(1L, tally.cases / 4));
+  EXPECT_GE(tally.across_px.size(), 1U);  // Isolated lines.
   expectMost(tally.across_px, 0.01, 0.98, "across, px,");
 }
 

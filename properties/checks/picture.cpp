@@ -531,6 +531,7 @@ PictureOutcome checkChanged(const PictureCase& c, const DetectorOptions& options
       // The grid of rays lies elsewhere, by which rounding differs; where it is nearly undecided
       // whether an edge is an arc, a line more or less may be found.
       const size_t with = view.lines.size(), without = of_part.lines.size();
+      if (is_empty) outcome.counted = static_cast<long>(std::max(with, without));
       if (is_empty && std::max(with, without) > std::min(with, without) + 1 &&
           outcome.failure.empty()) {
         outcome.failure = fmt::format("{} lines with the border, {} without it", with, without);

@@ -65,7 +65,7 @@ struct PictureOutcome {
   bool applies = true;
   std::string failure;  ///< Empty: the property holds. Else one line: what, where, by how much.
   /// Of what the property speaks: isolated lines, pixels of lines (kEquation8), or all lines
-  /// (kAnyPicture, kNoise, kCurved).
+  /// (kAnyPicture, kNoise, kCurved, kEmptyBorder).
   long counted = 0;
   long long_lines = 0;  ///< kNoise: of 40 px or more.
   /// Of each isolated line that was compared; ends of the properties that compare them.
