@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
 # Line and branch coverage of cameras, synth, detector and evaluation by their tests and the
 # property suites, with a fraction of the quick preset's cases.
-#   scripts/coverage.sh [CTEST-ARGUMENT...]
+#   scripts/coverage.sh [--modules] [CTEST-ARGUMENT...]
+# --modules: only the modules' own tests, without the property suites and the program's tests.
 # Prints a table of modules, then the files below 95 % of lines; build/coverage/coverage.json has
 # all of it. Branches that only exceptions take are left out.
 set -euo pipefail
@@ -10,13 +11,20 @@ source scripts/packages.sh
 
 need_packages "${build_packages[@]}" "${test_packages[@]}" gcovr
 build=build/coverage
+folders=(.)
+if [[ ${1:-} == --modules ]]; then
+  folders=(cameras synth detector evaluation)
+  shift
+fi
 if ! configured coverage DLSD_TESTS=ON; then configure coverage DLSD_TESTS=ON; fi
-build coverage
+build coverage --target "${folders[@]/%//all}"
 find $build -name '*.gcda' -delete
 failed=0
 # A test that fails (or takes too long: counting makes it some ten times as slow) has run its lines.
-RC_PARAMS=${RC_PARAMS:-seed=1 max_success=20} \
-  ctest --test-dir $build -L quick -j"$(nproc)" --output-on-failure "$@" | tail -30 || failed=1
+for folder in "${folders[@]}"; do
+  RC_PARAMS=${RC_PARAMS:-seed=1 max_success=20} ctest --test-dir $build/$folder -L quick \
+    -j"$(nproc)" --output-on-failure "$@" | tail -30 || failed=1
+done
 gcovr --root . --object-directory $build --json-summary $build/coverage.json \
   --exclude-unreachable-branches --exclude-throw-branches -j "$(nproc)" \
   --gcov-ignore-parse-errors \
