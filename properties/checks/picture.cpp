@@ -884,20 +884,17 @@ PictureOutcome checkCurved(const PictureCase& c, const DetectorOptions& options,
   ShownPicture shown;
   if (with_shown) shown = view.shown();
   constexpr double kRowsPx = 4;
-  const double longest = longestStraightPiece(c.camera, cone, options.validation.rho_px);
-  const double tight = longestStraightPiece(c.camera, cone, options.validation.tight_rho_px);
+  // A line's ends are known to the four rows it ends in; and any piece of an outline may be as long
+  // as the detector's shortest lines.
+  const double straight = longestStraightPiece(c.camera, cone, options.validation.tight_rho_px);
+  const double allowed = std::max(straight, options.validation.min_length_px) + kRowsPx;
   for (const Seen& seen : view.lines) {
     ++outcome.counted;
-    // A line's ends are known to the four rows it ends in; and any piece of an outline may be as
-    // long as the detector's shortest lines.
-    const auto allowed = [&](double straight) {
-      return std::max(straight, options.validation.min_length_px) + kRowsPx;
-    };
     const double length_px = shownLength(c.camera, seen.line);
-    outcome.shares.push_back(length_px / allowed(tight));
-    if (!(length_px <= allowed(longest))) {
+    outcome.shares.push_back(length_px / allowed);
+    if (!(length_px <= allowed)) {
       failAt(seen,
-             fmt::format("{:.1f} px where {:.1f} px are straight", length_px, longest),
+             fmt::format("{:.1f} px where {:.1f} px are straight", length_px, straight),
              &shown,
              &outcome);
     }
