@@ -70,8 +70,11 @@ struct Frames {
 /// prints the summary that it returns for each model.
 void forFrames(const Frames& frames, const auto& judge, const auto& summary) {
   const uint64_t seed = rcParam("seed").value_or(std::random_device{}());
-  const auto count = static_cast<uint64_t>(std::max(
-      3.0, static_cast<double>(rcParam("max_success").value_or(100)) * frames.frames_per_case));
+  // Of fewer frames than those of the quick preset, shares say too little.
+  constexpr uint64_t kQuickCases = 200;
+  const uint64_t cases = std::max(kQuickCases, rcParam("max_success").value_or(kQuickCases));
+  const auto count =
+      static_cast<uint64_t>(static_cast<double>(cases) * frames.frames_per_case + 1e-9);
   std::cout << "seed " << seed << ", " << count << " frames of each model\n";
   for (const std::string_view model : cameraModelNames()) {
     for (uint64_t i = 0; i < count; ++i) {
