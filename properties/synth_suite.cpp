@@ -123,6 +123,8 @@ bool isInner(EndKind kind) {
 constexpr double kNearbyRad = 2e-5;
 /// Nearer to a border, rays of floats may be on either side.
 constexpr double kRoundingRad = 3e-7;
+/// A span of less is 0.002 px in these cameras.
+constexpr double kShortSpanRad = 1e-5;
 /// Where the contrast is stated.
 constexpr double kBesideRad = 2e-4;
 /// Contrast is stated from this many places spread evenly over a label's angle.
@@ -259,8 +261,10 @@ TEST(SynthSuite, LabelsLieOnDiscontinuities) {
       if (isMiddle(seen.scene, line) || line.contrast_min < 3) continue;
       // One of the places at which contrast is stated, through the image.
       const double phi = line.angle_rad * (line.id % kContrastPlaces + 0.5) / kContrastPlaces;
-      // At an end, what is beyond it may be there, too.
-      if (std::min(phi, line.angle_rad - phi) < 2 * kShortestSpanRad) {
+      // At an end, what is beyond it may be there, too; and whether so short a span is seen at all,
+      // rays of floats decide (synth/labels.h).
+      if (std::min(phi, line.angle_rad - phi) < 2 * kShortestSpanRad ||
+          line.angle_rad < kShortSpanRad) {
         ++ends_seen;
         continue;
       }
