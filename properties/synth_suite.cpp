@@ -551,15 +551,11 @@ void forHiddenMiddles(const Viewed& seen, const Camera& camera, const auto& func
     const double distance = (point - eye).norm();
     const Eigen::Vector3f direction = ((point - eye) / distance).cast<float>();
     const auto end = static_cast<float>(distance * (1 - 1e-4));
-    for (float begin = 0; begin < end;) {
-      const Hit hit = seen.raycaster.cast(eye.cast<float>(), direction, begin, end);
-      if (hit.kind == HitKind::kNothing) return false;
-      const bool is_own =
-          edge.source == EdgeSource::kRodCentre && isOnRod(hit, seen.scene, edge.rod);
-      if (!is_own) return true;
-      begin = hit.distance * (1 + 1e-6F);
-    }
-    return false;
+    const auto isOwn = [&](const Hit& hit) {
+      return edge.source == EdgeSource::kRodCentre && isOnRod(hit, seen.scene, edge.rod);
+    };
+    return seen.raycaster.cast(eye.cast<float>(), direction, 0, end, isOwn).kind !=
+           HitKind::kNothing;
   };
   for (const Edge& edge : seen.scene.edges) {
     const bool is_bar =

@@ -241,15 +241,9 @@ class View {
     const Eigen::Vector3f direction = (d / distance).cast<float>();
     // Contact aside, nothing is nearer to an edge than about 1 mm: 1e-5 of the distance is less.
     const auto end = static_cast<float>(distance * (DLSD_MUTANT("label-hidden") ? 0.99 : 1 - 1e-5));
-    float begin = 0;
-    for (;;) {
-      const Hit hit = raycaster_.cast(pose_.position_in_world.cast<float>(), direction, begin, end);
-      if (hit.kind == HitKind::kNothing) return false;
-      if (!mayLookThrough(hit, edge)) return true;
-      begin = std::max(hit.distance * (1 + 1e-6F),
-                       std::nextafter(hit.distance, std::numeric_limits<float>::infinity()));
-      if (!(begin < end)) return false;
-    }
+    const auto looksThrough = [&](const Hit& hit) { return mayLookThrough(hit, edge); };
+    const Eigen::Vector3f eye = pose_.position_in_world.cast<float>();
+    return raycaster_.cast(eye, direction, 0, end, looksThrough).kind != HitKind::kNothing;
   }
 
  private:

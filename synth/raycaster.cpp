@@ -57,32 +57,6 @@ T* newBuffer(
   return static_cast<T*>(data);
 }
 
-#if RTC_VERSION_MAJOR >= 4
-void intersect1(RTCScene scene, RTCRayHit* ray) {
-  RTCIntersectArguments arguments;
-  rtcInitIntersectArguments(&arguments);
-  rtcIntersect1(scene, ray, &arguments);
-}
-void intersect16(const int* valid, RTCScene scene, RTCRayHit16* rays) {
-  RTCIntersectArguments arguments;
-  rtcInitIntersectArguments(&arguments);
-  arguments.flags = RTC_RAY_QUERY_FLAG_COHERENT;
-  rtcIntersect16(valid, scene, rays, &arguments);
-}
-#else
-void intersect1(RTCScene scene, RTCRayHit* ray) {
-  RTCIntersectContext context;
-  rtcInitIntersectContext(&context);
-  rtcIntersect1(scene, &context, ray);
-}
-void intersect16(const int* valid, RTCScene scene, RTCRayHit16* rays) {
-  RTCIntersectContext context;
-  rtcInitIntersectContext(&context);
-  context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
-  rtcIntersect16(valid, scene, &context, rays);
-}
-#endif
-
 constexpr unsigned kTriangles = 0, kSpheres = 1, kDiscs = 2, kTubes = 3, kRods = 4;
 
 /// A piece of a tube, or a cylinder, in its box.
@@ -116,6 +90,97 @@ struct RoundParts {
   }
 };
 
+/// The scene's shapes, as Embree numbers them.
+struct Shapes {
+  explicit Shapes(const Scene& scene) : tubes{&scene, kTubes, {}}, rods{&scene, kRods, {}} {}
+
+  [[nodiscard]] Hit hitOf(unsigned geometry, unsigned primitive, float distance) const {
+    switch (geometry) {
+      case kTriangles:
+        return {HitKind::kFace, triangle_faces[primitive], distance};
+      case kSpheres:
+        return {HitKind::kSphere, static_cast<int>(primitive), distance};
+      case kDiscs:
+        return {HitKind::kDisc, static_cast<int>(primitive), distance};
+      case kTubes:
+        return {HitKind::kTube, tubes.parts[primitive].index, distance};
+      case kRods:
+        return {HitKind::kRod, rods.parts[primitive].index, distance};
+      default:
+        return {};
+    }
+  }
+
+  std::vector<int> triangle_faces;
+  RoundParts tubes, rods;
+};
+
+/// What Embree hands back to us with each ray.
+#if RTC_VERSION_MAJOR >= 4
+using Context = RTCRayQueryContext;
+constexpr RTCSceneFlags kFilterFlag = RTC_SCENE_FLAG_FILTER_FUNCTION_IN_ARGUMENTS;
+#else
+using Context = RTCIntersectContext;
+constexpr RTCSceneFlags kFilterFlag = RTC_SCENE_FLAG_CONTEXT_FILTER_FUNCTION;
+#endif
+struct Query : Context {
+  const Shapes* shapes = nullptr;
+  const Raycaster::Transparent* transparent = nullptr;  ///< Null if nothing is.
+
+  [[nodiscard]] bool goesPast(unsigned geometry, unsigned primitive, float distance) const {
+    return transparent != nullptr &&
+           transparent->test(transparent->self, shapes->hitOf(geometry, primitive, distance));
+  }
+};
+
+/// For shapes that Embree intersects; asked in casts of single rays only.
+void filter(const RTCFilterFunctionNArguments* args) {
+  const auto& query = *static_cast<const Query*>(args->context);
+  for (unsigned i = 0; i < args->N; ++i) {
+    if (args->valid[i] != 0 && query.goesPast(RTCHitN_geomID(args->hit, args->N, i),
+                                              RTCHitN_primID(args->hit, args->N, i),
+                                              RTCRayN_tfar(args->ray, args->N, i))) {
+      args->valid[i] = 0;
+    }
+  }
+}
+
+#if RTC_VERSION_MAJOR >= 4
+void allowFilter(RTCGeometry geometry) {
+  rtcSetGeometryEnableFilterFunctionFromArguments(geometry, true);
+}
+void intersect1(RTCScene scene, Query* query, RTCRayHit* ray) {
+  rtcInitRayQueryContext(query);
+  RTCIntersectArguments arguments;
+  rtcInitIntersectArguments(&arguments);
+  arguments.context = query;
+  if (query->transparent != nullptr) arguments.filter = filter;
+  rtcIntersect1(scene, ray, &arguments);
+}
+void intersect16(const int* valid, RTCScene scene, RTCRayHit16* rays) {
+  Query query;
+  rtcInitRayQueryContext(&query);
+  RTCIntersectArguments arguments;
+  rtcInitIntersectArguments(&arguments);
+  arguments.context = &query;
+  arguments.flags = RTC_RAY_QUERY_FLAG_COHERENT;
+  rtcIntersect16(valid, scene, rays, &arguments);
+}
+#else
+void allowFilter(RTCGeometry /*geometry*/) {}
+void intersect1(RTCScene scene, Query* query, RTCRayHit* ray) {
+  rtcInitIntersectContext(query);
+  if (query->transparent != nullptr) query->filter = filter;
+  rtcIntersect1(scene, query, ray);
+}
+void intersect16(const int* valid, RTCScene scene, RTCRayHit16* rays) {
+  Query query;
+  rtcInitIntersectContext(&query);
+  query.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
+  rtcIntersect16(valid, scene, &query, rays);
+}
+#endif
+
 void boundsOf(const RTCBoundsFunctionArguments* args) {
   const auto& shapes = *static_cast<const RoundParts*>(args->geometryUserPtr);
   const Eigen::AlignedBox3d& box = shapes.parts[args->primID].box;
@@ -132,6 +197,7 @@ void boundsOf(const RTCBoundsFunctionArguments* args) {
 void intersectRound(const RTCIntersectFunctionNArguments* args) {
   const auto& shapes = *static_cast<const RoundParts*>(args->geometryUserPtr);
   const RoundPart& part = shapes.parts[args->primID];
+  const auto& query = *static_cast<const Query*>(args->context);
   const unsigned n = args->N;
   RTCRayN* rays = RTCRayHitN_RayN(args->rayhit, n);
   RTCHitN* hits = RTCRayHitN_HitN(args->rayhit, n);
@@ -152,7 +218,9 @@ void intersectRound(const RTCIntersectFunctionNArguments* args) {
                                        static_cast<double>(RTCRayN_tnear(rays, n, i)),
                                        static_cast<double>(far));
     if (!distance) continue;
-    far = static_cast<float>(*distance);
+    const auto at = static_cast<float>(*distance);
+    if (query.goesPast(shapes.geometry, args->primID, at)) continue;
+    far = at;
     RTCHitN_geomID(hits, n, i) = shapes.geometry;
     RTCHitN_primID(hits, n, i) = args->primID;
     RTCHitN_instID(hits, n, i, 0) = RTC_INVALID_GEOMETRY_ID;
@@ -257,16 +325,16 @@ Mesh meshOf(const Scene& scene) {
 }  // namespace
 
 struct Raycaster::Impl {
-  explicit Impl(const Scene& scene) : tubes{&scene, kTubes, {}}, rods{&scene, kRods, {}} {
+  explicit Impl(const Scene& scene) : shapes(scene) {
     rtc_scene = rtcNewScene(device());
     if (rtc_scene == nullptr) throw SystemError("the ray caster is out of memory");
-    rtcSetSceneFlags(rtc_scene, RTC_SCENE_FLAG_ROBUST);
+    rtcSetSceneFlags(rtc_scene, RTC_SCENE_FLAG_ROBUST | kFilterFlag);
     try {
       if (!scene.triangles.empty()) addTriangles(scene);
       if (!scene.spheres.empty()) addSpheres(scene);
       if (!scene.discs.empty()) addDiscs(scene);
-      addRound(&tubes, tubeParts(scene));
-      addRound(&rods, rodParts(scene));
+      addRound(&shapes.tubes, tubeParts(scene));
+      addRound(&shapes.rods, rodParts(scene));
       // An arena of one thread: the tree, and so the winner among equal distances, does not depend
       // on the number of threads, and this thread does not pick up another frame while it waits.
       tbb::task_arena(1).execute([&] { rtcCommitScene(rtc_scene); });
@@ -283,6 +351,7 @@ struct Raycaster::Impl {
   Impl& operator=(const Impl&) = delete;
 
   void attach(RTCGeometry geometry, unsigned id) const {
+    allowFilter(geometry);
     rtcCommitGeometry(geometry);
     rtcAttachGeometryByID(rtc_scene, geometry, id);
     rtcReleaseGeometry(geometry);
@@ -304,10 +373,10 @@ struct Raycaster::Impl {
                                         RTC_FORMAT_UINT3,
                                         3 * sizeof(unsigned),
                                         mesh.triangles.size());
-    triangle_faces.reserve(mesh.triangles.size());
+    shapes.triangle_faces.reserve(mesh.triangles.size());
     for (const Triangle& triangle : mesh.triangles) {
       for (const int v : triangle.vertices) *indices++ = static_cast<unsigned>(v);
-      triangle_faces.push_back(triangle.face);
+      shapes.triangle_faces.push_back(triangle.face);
     }
     attach(geometry, kTriangles);
   }
@@ -358,37 +427,19 @@ struct Raycaster::Impl {
     return parts;
   }
 
-  void addRound(RoundParts* shapes, std::vector<RoundPart> parts) const {
-    shapes->parts = std::move(parts);
-    if (shapes->parts.empty()) return;
+  void addRound(RoundParts* round, std::vector<RoundPart> parts) const {
+    round->parts = std::move(parts);
+    if (round->parts.empty()) return;
     const RTCGeometry geometry = rtcNewGeometry(device(), RTC_GEOMETRY_TYPE_USER);
-    rtcSetGeometryUserPrimitiveCount(geometry, static_cast<unsigned>(shapes->parts.size()));
-    rtcSetGeometryUserData(geometry, shapes);
+    rtcSetGeometryUserPrimitiveCount(geometry, static_cast<unsigned>(round->parts.size()));
+    rtcSetGeometryUserData(geometry, round);
     rtcSetGeometryBoundsFunction(geometry, boundsOf, nullptr);
     rtcSetGeometryIntersectFunction(geometry, intersectRound);
-    attach(geometry, shapes->geometry);
-  }
-
-  [[nodiscard]] Hit hitOf(unsigned geometry, unsigned primitive, float distance) const {
-    switch (geometry) {
-      case kTriangles:
-        return {HitKind::kFace, triangle_faces[primitive], distance};
-      case kSpheres:
-        return {HitKind::kSphere, static_cast<int>(primitive), distance};
-      case kDiscs:
-        return {HitKind::kDisc, static_cast<int>(primitive), distance};
-      case kTubes:
-        return {HitKind::kTube, tubes.parts[primitive].index, distance};
-      case kRods:
-        return {HitKind::kRod, rods.parts[primitive].index, distance};
-      default:
-        return {};
-    }
+    attach(geometry, round->geometry);
   }
 
   RTCScene rtc_scene = nullptr;
-  std::vector<int> triangle_faces;
-  RoundParts tubes, rods;
+  Shapes shapes;
 };
 
 Raycaster::Raycaster(const Scene& scene) : impl_(std::make_unique<Impl>(scene)) {}
@@ -437,7 +488,7 @@ void Raycaster::castPacket(const Eigen::Vector3f& origin,
   std::fill_n(rays.ray.tfar, kPacket, std::numeric_limits<float>::infinity());
   intersect16(active.data(), impl_->rtc_scene, &rays);
   for (size_t i = 0; i < count; ++i) {
-    hits[i] = impl_->hitOf(rays.hit.geomID[i], rays.hit.primID[i], rays.ray.tfar[i]);
+    hits[i] = impl_->shapes.hitOf(rays.hit.geomID[i], rays.hit.primID[i], rays.ray.tfar[i]);
   }
 }
 
@@ -456,7 +507,7 @@ void Raycaster::castPacket(const RayPacket& packet, size_t count, Hit* hits) con
   std::copy_n(packet.max_distance.data(), kPacket, rays.ray.tfar);
   intersect16(active.data(), impl_->rtc_scene, &rays);
   for (size_t i = 0; i < count; ++i) {
-    hits[i] = impl_->hitOf(rays.hit.geomID[i], rays.hit.primID[i], rays.ray.tfar[i]);
+    hits[i] = impl_->shapes.hitOf(rays.hit.geomID[i], rays.hit.primID[i], rays.ray.tfar[i]);
   }
 }
 
@@ -464,6 +515,14 @@ Hit Raycaster::cast(const Eigen::Vector3f& origin,
                     const Eigen::Vector3f& direction,
                     float min_distance,
                     float max_distance) const {
+  return castPast(origin, direction, min_distance, max_distance, nullptr);
+}
+
+Hit Raycaster::castPast(const Eigen::Vector3f& origin,
+                        const Eigen::Vector3f& direction,
+                        float min_distance,
+                        float max_distance,
+                        const Transparent* transparent) const {
   RTCRayHit ray;
   ray.ray.org_x = origin.x();
   ray.ray.org_y = origin.y();
@@ -479,8 +538,11 @@ Hit Raycaster::cast(const Eigen::Vector3f& origin,
   ray.ray.flags = 0;
   ray.hit.geomID = RTC_INVALID_GEOMETRY_ID;
   ray.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
-  intersect1(impl_->rtc_scene, &ray);
-  return impl_->hitOf(ray.hit.geomID, ray.hit.primID, ray.ray.tfar);
+  Query query;
+  query.shapes = &impl_->shapes;
+  query.transparent = transparent;
+  intersect1(impl_->rtc_scene, &query, &ray);
+  return impl_->shapes.hitOf(ray.hit.geomID, ray.hit.primID, ray.ray.tfar);
 }
 
 }  // namespace dlsd

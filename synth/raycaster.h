@@ -79,8 +79,35 @@ class Raycaster {
                          float min_distance,
                          float max_distance) const;
 
+  /// The same, past all that `looksThrough(const Hit&)` says yes to: however near behind that
+  /// something else lies, it is met. (To cast anew from just behind each hit would miss it.)
+  template <class LooksThrough>
+  [[nodiscard]] Hit cast(const Eigen::Vector3f& origin,
+                         const Eigen::Vector3f& direction,
+                         float min_distance,
+                         float max_distance,
+                         const LooksThrough& looksThrough) const {
+    const auto test = [](const void* self, const Hit& hit) {
+      return (*static_cast<const LooksThrough*>(self))(hit);
+    };
+    const Transparent transparent{&looksThrough, test};
+    return castPast(origin, direction, min_distance, max_distance, &transparent);
+  }
+
+  /// A predicate on hits without its type.
+  struct Transparent {
+    const void* self;
+    bool (*test)(const void* self, const Hit& hit);
+  };
+
  private:
   struct Impl;
+  [[nodiscard]] Hit castPast(const Eigen::Vector3f& origin,
+                             const Eigen::Vector3f& direction,
+                             float min_distance,
+                             float max_distance,
+                             const Transparent* transparent) const;
+
   std::unique_ptr<Impl> impl_;
 };
 

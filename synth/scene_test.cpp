@@ -10,7 +10,6 @@
 #include <set>
 
 #include "synth/dataset/random.h"
-#include "synth/raycaster.h"
 #include "synth/variety.h"
 
 namespace dlsd {
@@ -354,31 +353,6 @@ TEST(Scene, RoundToFloatIsNearest) {
       EXPECT_LE(std::abs(rounded[k] - p[k]), std::ldexp(0.5, std::ilogb(p[k]) - 23));
     }
   }
-}
-
-// An edge is cut in pieces where floats come near to it.
-TEST(Raycaster, CutsEdgesAtFloatsNearThem) {
-  const Random random(4, 2);
-  constexpr uint64_t kEdges = 2000;
-  constexpr int kPieces = 7;
-  double best_sum = 0, any_sum = 0;
-  for (uint64_t i = 0; i < kEdges; ++i) {
-    Eigen::Vector3d from, to;
-    for (int k = 0; k < 3; ++k) {
-      const uint64_t at = 6 * i + 2 * static_cast<uint64_t>(k);
-      from[k] = random.uniform(at, -8, 8);
-      to[k] = random.uniform(at + 1, -8, 8);
-    }
-    const int cut = 1 + static_cast<int>(i % (kPieces - 1));
-    const Eigen::Vector3d axis = (to - from).normalized();
-    const Eigen::Vector3d exact = from + (to - from) * (static_cast<double>(cut) / kPieces);
-    const Eigen::Vector3d best = floatPointOnEdge(from, to, cut, kPieces).cast<double>();
-    EXPECT_LT((best - exact).norm(), 0.01 * (to - from).norm());
-    best_sum += axis.cross(best - from).norm();
-    any_sum += axis.cross(roundToFloat(exact) - from).norm();
-  }
-  EXPECT_LT(best_sum, 0.35 * any_sum);
-  EXPECT_GT(any_sum / kEdges, 1e-8);
 }
 
 TEST(Scene, PaperCameraMovesSmoothly) {

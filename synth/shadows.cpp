@@ -320,17 +320,15 @@ class LightView {
     const Vector3d direction = way / distance;
     const double margin = 1e-5 + 1e-6 * distance;
     const auto first = [&](double from, double to, const auto& ignores) -> Hit {
-      auto begin = static_cast<float>(from);
-      const auto end = static_cast<float>(to);
-      while (begin < end) {
-        const Hit hit = raycaster_.cast(start.cast<float>(), direction.cast<float>(), begin, end);
-        if (hit.kind == HitKind::kNothing) return hit;
-        const bool from_behind = hit.kind == HitKind::kFace && !looks(hit.index);
-        if (!from_behind && !ignores(hit)) return hit;
-        begin = std::max(hit.distance * (1 + 1e-6F),
-                         std::nextafter(hit.distance, std::numeric_limits<float>::infinity()));
-      }
-      return {};
+      if (!(from < to)) return {};
+      const auto isTransparent = [&](const Hit& hit) {
+        return (hit.kind == HitKind::kFace && !looks(hit.index)) || ignores(hit);
+      };
+      return raycaster_.cast(start.cast<float>(),
+                             direction.cast<float>(),
+                             static_cast<float>(from),
+                             static_cast<float>(to),
+                             isTransparent);
     };
     // Faces through the edge don't hide it.
     const auto isHere = [&](const Hit& hit) {

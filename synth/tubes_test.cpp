@@ -36,7 +36,7 @@ Tube drawTube(Random* random) {
 }
 
 Rod drawRoundRod(Random* random) {
-  const Vector3d middle(random->next(-1, 1), random->next(-1, 1), random->next(3, 6));
+  const Vector3d middle{random->next(-1, 1), random->next(-1, 1), random->next(3, 6)};
   const Vector3d half = random->next(0.2, 1) * drawDirection(random);
   Rod rod;
   rod.from = middle - half;
@@ -160,7 +160,7 @@ TEST(Tubes, OutlinesAreTouchedByLinesOfSight) {
 TEST(Cylinders, SidesAreTouchedByLinesOfSight) {
   Random random(1, 5);
   int found = 0, none = 0;
-  for (int k = 0; k < 200; ++k) {
+  for (int k = 0; k < 2000; ++k) {
     const Rod rod = drawRoundRod(&random);
     const Vector3d axis = (rod.to - rod.from).normalized();
     const Vector3d sun = drawDirection(&random);
@@ -183,7 +183,7 @@ TEST(Cylinders, SidesAreTouchedByLinesOfSight) {
       EXPECT_GE(sides[0][0].z(), sides[1][0].z());
     }
   }
-  EXPECT_GT(found, 300);
+  EXPECT_GT(found, 3000);
   EXPECT_GT(none, 0);
 }
 
