@@ -8,11 +8,16 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
+#include <filesystem>
 #include <numbers>
 #include <set>
 #include <sstream>
+#include <stdexcept>
+#include <string>
 
+#include "cameras/calibration/files.h"
 #include "properties/holds.h"
+#include "properties/worst.h"
 
 namespace dlsd {
 namespace {
@@ -237,6 +242,59 @@ TEST(Holds, FailsWhereMostCasesAreDiscarded) {
 TEST(Holds, CountsItsCases) {
   const auto wanted = std::max(10, rc::detail::configuration().testParams.maxSuccess / 2);
   EXPECT_EQ(holds(0.5, [] { RC_ASSERT(*genInt(0, 9) <= 9); }), wanted);
+}
+
+TEST(Holds, CountsNoCasesThatAreDiscarded) {
+  long judged = 0;
+  const long cases = holds(0.5, [&] {
+    RC_PRE(*genInt(0, 9) < 7);
+    ++judged;
+  });
+  EXPECT_GE(cases, 10);
+  EXPECT_EQ(cases, judged);
+}
+
+// What is tested may throw: a failure as others, shrunk for as long as others.
+long calls_after_failure = 0;
+void throwsAbove10() {
+  bool has_failed = false;
+  calls_after_failure = 0;
+  holds(1, [&] {
+    calls_after_failure += has_failed ? 1 : 0;
+    if (*genInt(0, 1000) <= 10) return;
+    has_failed = true;
+    throw std::runtime_error("thrown above 10");
+  });
+}
+TEST(Holds, AnExceptionIsAFailure) {
+  EXPECT_NONFATAL_FAILURE(throwsAbove10(), "\nint:\n11\n");
+  EXPECT_NONFATAL_FAILURE(throwsAbove10(), "thrown above 10");
+  EXPECT_GT(calls_after_failure, 1);
+  ASSERT_EQ(setenv("DLSD_SHRINK_SECONDS", "0", 1), 0);
+  EXPECT_NONFATAL_FAILURE(throwsAbove10(), "thrown above 10");
+  ASSERT_EQ(unsetenv("DLSD_SHRINK_SECONDS"), 0);
+  EXPECT_LE(calls_after_failure, 1);
+}
+
+// --- Worst ---
+
+TEST(Worst, KeepsTheWorstOfEachKindAndNaNForGood) {
+  const std::string path = testing::TempDir() + "worst_test.tsv";
+  std::filesystem::remove(path);
+  const char* given = std::getenv("DLSD_WORST");
+  const std::string kept = given != nullptr ? given : "";
+  ASSERT_EQ(setenv("DLSD_WORST", path.c_str(), 1), 0);
+  {
+    Worst worst("error, px", {"some", "others", "none"});
+    for (const double value : {1.0, 3.0, 2.0}) worst.see(value, 0);
+    for (const double value : {1.0, std::nan(""), 7.0, 0.5}) worst.see(value, 1);
+    EXPECT_EQ(worst.count(), 7);
+  }
+  ASSERT_EQ(given != nullptr ? setenv("DLSD_WORST", kept.c_str(), 1) : unsetenv("DLSD_WORST"), 0);
+  const std::string test = "Worst.KeepsTheWorstOfEachKindAndNaNForGood\terror, px\t";
+  EXPECT_EQ(readFile(path),
+            test + "some\t3\t3\n" + test + "others\tnan\t4\n" + test + "none\t0\t0\n");
+  std::filesystem::remove(path);
 }
 
 }  // namespace

@@ -38,7 +38,7 @@ long holds(double share, const std::function<void()>& property) {
   using Clock = std::chrono::steady_clock;
   const char* given = std::getenv("DLSD_SHRINK_SECONDS");
   const std::chrono::duration<double> most_shrinking(given != nullptr ? std::atof(given) : 5);
-  long cases = 0;
+  long judged = 0;
   std::optional<Clock::time_point> first_failure;
   rc::detail::TestParams params = rc::detail::configuration().testParams;
   params.maxSuccess = std::max(10, static_cast<int>(params.maxSuccess * share));
@@ -50,12 +50,21 @@ long holds(double share, const std::function<void()>& property) {
       [&] {
         // RapidCheck shrinks for as long as it likes: later candidates count as no failure.
         if (first_failure && Clock::now() - *first_failure > most_shrinking) return;
-        if (!first_failure) ++cases;
+        const auto fail = [&] {
+          if (first_failure) return;
+          ++judged;
+          first_failure = Clock::now();
+        };
         try {
           property();
-        } catch (const rc::detail::CaseResult& failure) {
-          const bool failed = failure.type == rc::detail::CaseResult::Type::Failure;
-          if (failed && !first_failure) first_failure = Clock::now();
+          if (!first_failure) ++judged;
+        } catch (const rc::detail::CaseResult& thrown) {
+          if (thrown.type == rc::detail::CaseResult::Type::Failure) fail();
+          throw;
+        } catch (const rc::GenerationFailure&) {  // RapidCheck discards the case.
+          throw;
+        } catch (...) {
+          fail();
           throw;
         }
       },
@@ -71,7 +80,7 @@ long holds(double share, const std::function<void()>& property) {
   std::ostringstream text;
   rc::detail::printResultMessage(result, text);
   EXPECT_TRUE(result.is<rc::detail::SuccessResult>()) << text.str();
-  return cases;
+  return judged;
 }
 
 }  // namespace dlsd

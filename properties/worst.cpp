@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <cstdlib>
 #include <fstream>
 #include <iomanip>
@@ -34,7 +35,7 @@ Worst::~Worst() {
 void Worst::see(double value, size_t kind) {
   Seen& seen = seen_[kind];
   ++seen.count;
-  if (!(value <= seen.value)) seen.value = value;
+  if (!std::isnan(seen.value) && !(value <= seen.value)) seen.value = value;
 }
 
 long Worst::count() const {

@@ -22,7 +22,7 @@ class Worst {
   Worst(const Worst&) = delete;
   Worst& operator=(const Worst&) = delete;
 
-  /// NaN counts as worse than everything.
+  /// NaN counts as worse than everything, whatever is seen later.
   void see(double value, size_t kind = 0);
   /// Of all kinds.
   [[nodiscard]] long count() const;
