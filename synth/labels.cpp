@@ -373,7 +373,10 @@ using StripeKey = std::array<int, 4>;
 StripeKey stripeKey(const Edge& edge) {
   return {edge.rod, edge.light, edge.face0, edge.disc};
 }
-std::set<StripeKey> findThinShadows(const Scene& scene, const Camera& camera, const Pose& pose) {
+std::set<StripeKey> findThinShadows(const Scene& scene,
+                                    const Camera& camera,
+                                    const Pose& pose,
+                                    const std::vector<EdgeSpan>& spans) {
   std::map<StripeKey, double> widest;
   for (size_t i = 0; i < scene.edges.size(); ++i) {
     const Edge& edge = scene.edges[i];
@@ -386,9 +389,25 @@ std::set<StripeKey> findThinShadows(const Scene& scene, const Camera& camera, co
       width = std::max(width, shadowWidthPx(scene, camera, pose, edge, point));
     });
   }
+  // A border may be on a face where the middle is on another one before it.
+  constexpr double kAlonePx = 10;
+  std::map<StripeKey, std::map<int, double>> seen_px;  // Per line of the stripe, by its caster.
+  for (const EdgeSpan& span : spans) {
+    const Edge& edge = scene.edges[static_cast<size_t>(span.edge)];
+    if (edge.source != EdgeSource::kShadow || edge.rod < 0) continue;
+    seen_px[stripeKey(edge)][edge.caster] += curveLength(span.curve);
+  }
   std::set<StripeKey> thin;
   for (const auto& [key, width] : widest) {
-    if (width < kThickRodPx) thin.insert(key);
+    if (!(width < kThickRodPx)) continue;
+    double middle_px = 0, border_px = 0;
+    for (const auto& [caster, length_px] : seen_px[key]) {
+      const bool is_middle =
+          scene.edges[static_cast<size_t>(caster)].source == EdgeSource::kRodCentre;
+      double& longest_px = is_middle ? middle_px : border_px;
+      longest_px = std::max(longest_px, length_px);
+    }
+    if (border_px <= middle_px + kAlonePx) thin.insert(key);
   }
   return thin;
 }
@@ -517,7 +536,7 @@ Labels makeLabels(const Scene& scene,
                   const std::vector<EdgeSpan>& spans) {
   const View view(scene, raycaster, pose);
   const std::vector<char> wires = findWires(scene, camera, pose);
-  const std::set<StripeKey> thin_shadows = findThinShadows(scene, camera, pose);
+  const std::set<StripeKey> thin_shadows = findThinShadows(scene, camera, pose, spans);
   const Eigen::Vector3f origin = pose.position_in_world.cast<float>();
   const Eigen::Matrix3d world_from_cam = pose.cam_from_world.transpose();
   struct Look {
@@ -540,6 +559,7 @@ Labels makeLabels(const Scene& scene,
   };
   std::vector<VertexEnd> vertex_ends;
   for (const EdgeSpan& span : spans) {
+    if (span.phi1 - span.phi0 < kShortestLabelRad) continue;
     const Edge& edge = scene.edges[static_cast<size_t>(span.edge)];
     const bool is_wire = edge.source == EdgeSource::kRodCentre;
     const bool is_shadow = edge.source == EdgeSource::kShadow;

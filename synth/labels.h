@@ -25,6 +25,10 @@ namespace dlsd {
 /// either: rays of floats do not see what is in between.
 inline constexpr double kShortestSpanRad = 1e-6;
 
+/// Spans shorter than this (rad) have no label: they are 0.05 px in a 500 px/rad camera, half as far
+/// as contrast and kind are looked at beside them, and not much more than rays of floats tell apart.
+inline constexpr double kShortestLabelRad = 1e-4;
+
 /// A rod is labelled by its centre line (`wire`) in a view in which it is nowhere thicker than
 /// this.
 inline constexpr double kThickRodPx = 3;
@@ -51,13 +55,14 @@ struct Labels {
   std::vector<Junction> junctions;
 };
 
-/// Labels of the spans.
+/// Labels of the spans of at least kShortestLabelRad.
 ///
 /// Rods: the width in px, 2 * radius seen across the centre line, is taken at 17 points of each
 /// imaged piece of the centre line (hidden or not); if the largest is >= kThickRodPx, or nothing of
 /// the centre line is in the image, the rod is labelled by its prism edges, else by its centre
-/// line. A rod's shadow on a face likewise: by its borders or its middle. What is labelled by its
-/// middle has no label where that is hidden, though a border may show.
+/// line. A rod's shadow on a face likewise: by its borders or its middle; by its borders, too, if one
+/// of them shows on that face for over 10 px more than the middle (which may lie on a panel before
+/// it). What is labelled by its middle has no label where that is hidden, though a border may show.
 ///
 /// Kind: decal borders are `material`, centre lines `wire`, borders of shadows `shadow` (present if
 /// the scene's edges hold them, see shadows.h). An edge of two faces is `crease` if
