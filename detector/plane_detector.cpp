@@ -1,5 +1,6 @@
 #include "detector/plane_detector.h"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 
@@ -66,12 +67,36 @@ bool PlaneDetector::isClaimed(const PlanarPiece& piece) const {
   return 2 * claimed >= piece.nodes;
 }
 
-bool PlaneDetector::mostlyClaimed() const {
+size_t PlaneDetector::claimedQuads() const {
   size_t claimed = 0;
   for (const LineTracer::Quad& q : tracer_.quads()) {
     claimed += claimed_.contains(static_cast<int>(q.x + 0.5F), static_cast<int>(q.y + 0.5F));
   }
-  return 2 * claimed >= tracer_.quads().size();
+  return claimed;
+}
+
+/// Removes the lines of which an arc is the whole. What ends a line from one side, such as a speck
+/// on the edge, a trace from the other side may cross.
+bool PlaneDetector::removePartsOf(const Arc& whole, std::vector<DetectedLine>* lines) const {
+  constexpr double kSamePx =
+      0.05;  // Else it is another edge's, which goes on in much the same way.
+  const Eigen::Vector3d axis = whole.from.cross(whole.to);
+  const auto isPart = [&](const DetectedLine& line) {
+    for (const Eigen::Vector3d& ray : {line.arc.from, line.arc.at(0.5), line.arc.to}) {
+      const auto J = rays_.camera().jacobian(ray);
+      if (!J) return false;
+      const double px_per_rad = J->norm();
+      const double off_px = std::abs(whole.angleToPlane(ray)) * px_per_rad;
+      const double sigma_px = std::sqrt(ray.dot(line.normal_cov * ray)) * px_per_rad;
+      const double phi =
+          std::atan2(axis.normalized().dot(whole.from.cross(ray)), whole.from.dot(ray));
+      const double slack_rad = LineTracer::kQuadPx / px_per_rad;
+      const bool is_between = phi >= -slack_rad && phi <= whole.angle() + slack_rad;
+      if (!(off_px <= kSamePx + 2 * sigma_px && is_between)) return false;
+    }
+    return true;
+  };
+  return std::erase_if(*lines, isPart) > 0;
 }
 
 void PlaneDetector::claim() {
@@ -140,10 +165,10 @@ void PlaneDetector::keepRest(const PlanarPiece& piece) {
 
 void PlaneDetector::trace(const PlanarPiece& piece, std::vector<DetectedLine>* lines) {
   const auto traced = tracer_.trace(piece, splitter_.nodes());
-  if (!traced || (traced->is_arc && !DLSD_MUTANT("arcs-are-lines")) ||
-      (mostlyClaimed() && !DLSD_MUTANT("lines-twice"))) {
-    return;
-  }
+  if (!traced || (traced->is_arc && !DLSD_MUTANT("arcs-are-lines"))) return;
+  const size_t quads = tracer_.quads().size(), claimed = claimedQuads();
+  const bool is_known = 2 * claimed >= quads && !DLSD_MUTANT("lines-twice");
+  if (is_known && quads - claimed < LineTracer::kMinQuads) return;
   const double off_rad = DLSD_MUTANT("line-offset") ? 2e-4 : 0;
   const auto arc = visibleArc(rays_.camera(),
                               (traced->fit.normal + off_rad * traced->middle_ray).normalized(),
@@ -152,6 +177,7 @@ void PlaneDetector::trace(const PlanarPiece& piece, std::vector<DetectedLine>* l
                               traced->to_ray,
                               traced->is_inside);
   if (!arc) return;
+  if (is_known && (DLSD_MUTANT("parts-stay") || !removePartsOf(*arc, lines))) return;
   claim();
   DetectedLine& line = lines->emplace_back();
   line.arc = *arc;

@@ -33,7 +33,8 @@ class PlaneDetector {
   void trace(const PlanarPiece& piece, std::vector<DetectedLine>* lines);
   void keepRest(const PlanarPiece& piece);
   [[nodiscard]] bool isClaimed(const PlanarPiece& piece) const;
-  [[nodiscard]] bool mostlyClaimed() const;
+  [[nodiscard]] size_t claimedQuads() const;
+  bool removePartsOf(const Arc& whole, std::vector<DetectedLine>* lines) const;
   void claim();
 
   const RayTable& rays_;
