@@ -18,6 +18,7 @@
 #include "cameras/batch.h"
 #include "cameras/calibration/files.h"
 #include "properties/gen.h"
+#include "properties/holds.h"
 #include "properties/oracle.h"
 #include "properties/worst.h"
 
@@ -307,13 +308,12 @@ void buildsGiveTheSameBits(const Camera& camera, long& compared) {
 }
 
 TEST_P(BatchSuite, BuildsAndSinglePointsGiveTheSameBits) {
-  long compared = 0, cases = 0;
-  EXPECT_TRUE(rc::check([&] {
+  long compared = 0;
+  const long cases = holds(1, [&] {
     const Camera camera = *genCamera(GetParam(), drawRange());
     buildsGiveTheSameBits<double>(camera, compared);
     buildsGiveTheSameBits<float>(camera, compared);
-    ++cases;
-  }));
+  });
   EXPECT_EQ(compared, cases * 2 * 97 * static_cast<long>(supportedBuilds().size()));
   EXPECT_GT(cases, 0);
 }
@@ -426,13 +426,13 @@ void budgetsAreKept(std::string_view model) {
   Worst project(kIsFloat<T> ? "projection in float, px" : "projection, px");
   Worst unresolved("projection where rays do not resolve the budget, over what they do");
   Worst unproject(kIsFloat<T> ? "unprojection in float, px" : "unprojection, px");
-  EXPECT_TRUE(rc::check([&] {
+  holds(1, [&] {
     const Camera camera = *genCamera(model, Range::kRealistic);
     projectionKeepsItsBudget<T>(
         camera, kIsFloat<T> ? budget.float_project_px : budget.project_px, project, unresolved);
     unprojectionKeepsItsBudget<T>(
         camera, kIsFloat<T> ? budget.float_unproject_px : budget.unproject_px, unproject);
-  }));
+  });
   EXPECT_GT(project.count(), 1000);
   EXPECT_LE(unresolved.count(), project.count() / 100);
   EXPECT_GT(unproject.count(), 1000);

@@ -26,6 +26,7 @@
 #include "cameras/calibration/calibration.h"
 #include "cameras/calibration/files.h"
 #include "properties/gen.h"
+#include "properties/holds.h"
 #include "properties/oracle.h"
 #include "properties/worst.h"
 #ifdef DLSD_HAVE_CALIB3D
@@ -177,19 +178,6 @@ std::string describe(const Camera& camera, const Vector2d& pixel) {
   return text.str();
 }
 
-/// Runs a property and returns the number of its cases. How much it has tried, the caller counts
-/// and compares with that: a property that skips everything fails.
-template <class Property>
-long holds(const Property& property) {
-  long cases = 0;
-  EXPECT_TRUE(rc::check([&] {
-    ++cases;
-    property();
-  })) << "see the counterexample above";
-  EXPECT_GT(cases, 0);
-  return cases;
-}
-
 /// By model name.
 class CameraSuite : public ::testing::TestWithParam<std::string_view> {};
 INSTANTIATE_TEST_SUITE_P(,
@@ -265,7 +253,7 @@ TEST_P(CameraSuite, PixelsInsideTheImageComeBack) {
   Worst unresolved("the same where rays and pixels do not resolve 1e-10 px, over what they resolve",
                    kKinds);
   long seen = 0, drawn = 0;
-  holds([&] {
+  holds(1, [&] {
     const Drawn from = *genDrawn(GetParam());
     const Camera& camera = from.camera;
     const Kind kind = from.kind;
@@ -309,7 +297,7 @@ TEST_P(CameraSuite, RaysComeBack) {
   Worst worst("ray -> pixel -> ray, in units of 8 ulp(px) / smallest singular value", kKinds);
   Worst worst_far("the same outside the image or in odd cameras, plus the resolution of a ray",
                   kKinds);
-  const long cases = holds([&] {
+  const long cases = holds(1, [&] {
     const Drawn from = *genDrawn(GetParam());
     const Camera& camera = from.camera;
     const Kind kind = from.kind;
@@ -342,7 +330,7 @@ TEST_P(CameraSuite, RaysComeBack) {
 
 TEST_P(CameraSuite, ValidOneWayImpliesValidBack) {
   long rays = 0, pixels = 0;
-  const long cases = holds([&] {
+  const long cases = holds(1, [&] {
     const Drawn from = *genDrawn(GetParam());
     const Camera& camera = from.camera;
     for (const Vector3d& ray : many(genRayFor(camera))) {
@@ -378,7 +366,7 @@ TEST_P(CameraSuite, ValidOneWayImpliesValidBack) {
 
 TEST_P(CameraSuite, RaysAreValidExactlyInsideTheDomain) {
   long inside = 0, outside = 0;
-  const long cases = holds([&] {
+  const long cases = holds(1, [&] {
     const Drawn from = *genDrawn(GetParam());
     const Camera& camera = from.camera;
     const CameraModelVariant& model = camera.model();
@@ -414,7 +402,7 @@ TEST_P(CameraSuite, RaysAreValidExactlyInsideTheDomain) {
 
 TEST_P(CameraSuite, PixelsAreValidExactlyInsideTheDomain) {
   long inside = 0, outside = 0;
-  const long cases = holds([&] {
+  const long cases = holds(1, [&] {
     const Camera drawn = (*genDrawn(GetParam())).camera;
     // The limit of the field angle is a bound on rays; here it is the model's own bound that
     // counts.
@@ -462,7 +450,7 @@ TEST_P(CameraSuite, ValidImpliesFiniteAndUnit) {
                                     1e-9,   -1e9,   1e-17,  -1e-17,  1e-8,  640.0};
   Worst worst("| |ray| - 1 |, in ulp(1)", kKinds);
   long accepted = 0;
-  const long cases = holds([&] {
+  const long cases = holds(1, [&] {
     const Drawn from = *genDrawn(GetParam());
     const Camera& camera = from.camera;
     const Kind kind = from.kind;
@@ -514,7 +502,7 @@ TEST_P(CameraSuite, ValidImpliesFiniteAndUnit) {
 TEST_P(CameraSuite, TheLengthOfARayDoesNotMatter) {
   Worst worst("difference, in units of 8 ulp(px) + 2 * largest singular value * ray resolution",
               kKinds);
-  const long cases = holds([&] {
+  const long cases = holds(1, [&] {
     const Drawn from = *genDrawn(GetParam());
     const Camera& camera = from.camera;
     const Kind kind = from.kind;
@@ -542,7 +530,7 @@ TEST_P(CameraSuite, TheLengthOfARayDoesNotMatter) {
 TEST_P(CameraSuite, AgreesWithTheTextbookInLongDouble) {
   Worst worst("difference, in units of 8 ulp(px) + largest singular value * ray resolution",
               kKinds);
-  const long cases = holds([&] {
+  const long cases = holds(1, [&] {
     const Drawn from = *genDrawn(GetParam());
     const Camera& camera = from.camera;
     const Kind kind = from.kind;
@@ -565,7 +553,7 @@ TEST_P(CameraSuite, AgreesWithTheTextbookInLongDouble) {
 TEST_P(CameraSuite, TheJacobianIsTheDerivative) {
   Worst worst("against automatic differentiation, in what is allowed", kKinds);
   Worst euler("|J ray| / |J|, in ulp(1)", kKinds);
-  const long cases = holds([&] {
+  const long cases = holds(1, [&] {
     const Drawn from = *genDrawn(GetParam());
     const Camera& camera = from.camera;
     const Kind kind = from.kind;
@@ -597,7 +585,7 @@ TEST_P(CameraSuite, TheJacobianIsTheDerivative) {
 
 TEST_P(CameraSuite, TheImageIsContinuousAcrossTheAxis) {
   Worst worst("deviation from J * offset, in units of 4 ulp(px)", kKinds);
-  const long cases = holds([&] {
+  const long cases = holds(1, [&] {
     const Drawn from = *genDrawn(GetParam());
     const Camera& camera = from.camera;
     const Kind kind = from.kind;
@@ -637,7 +625,7 @@ TEST_P(CameraSuite, TheImageIsContinuousAcrossTheAxis) {
 
 TEST_P(CameraSuite, BatchesEqualSinglePoints) {
   long compared = 0;
-  const long cases = holds([&] {
+  const long cases = holds(1, [&] {
     const Drawn from = *genDrawn(GetParam());
     const Camera& camera = from.camera;
     const size_t n = *rc::gen::elementOf(std::vector<size_t>{0, 1, 2, 3, 4, 5, 7, 8, 9, 31, 64});
@@ -674,7 +662,7 @@ TEST_P(CameraSuite, BatchesEqualSinglePoints) {
 TEST_P(CameraSuite, KalibrFilesGiveBackTheSameCamera) {
   const std::string path = ::testing::TempDir() + "dlsd_camera_suite_" + std::string(GetParam()) +
                            std::to_string(::getpid()) + ".yaml";
-  holds([&] {
+  holds(1, [&] {
     const Camera a = (*genDrawn(GetParam())).camera;
     const Camera b = *genAnyCamera(Range::kAdmissible);
     saveCameras(path, {{"cam0", a}, {"cam1", b}});
@@ -717,7 +705,7 @@ TEST_P(CameraSuite, TheImageOfAPlaneStaysOnItsArc) {
   Worst chord("distance of the curve to its chords, in units of 0.01 px");
   Worst across("angle of the chords to the plane, in units of 0.01 px / smallest singular value");
   long samples = 0;
-  const long cases = holds([&] {
+  const long cases = holds(1, [&] {
     const Camera camera = *genCamera(GetParam(), Range::kRealistic);
     for (int n = 0; n < 4; ++n) {
       const Arc arc = drawArc(camera);
@@ -775,7 +763,7 @@ TEST_P(CameraSuite, TheImageOfAPlaneStaysOnItsArc) {
 TEST_P(CameraSuite, SpansAreThoseOfADenseSampling) {
   const bool panorama = GetParam() == Equirectangular::kName;
   long spans_seen = 0, with_gap = 0, rims = 0, seams = 0;
-  const long cases = holds([&] {
+  const long cases = holds(1, [&] {
     const Camera camera = *genCamera(GetParam(), Range::kRealistic);
     for (int n = 0; n < 6; ++n) {
       const Arc arc = drawArc(camera);
@@ -882,7 +870,7 @@ TEST_P(CameraSuite, TheDocumentedParametersAreThose) {
 void expectSameImages(const std::function<std::pair<Camera, Camera>()>& draw_pair) {
   Worst worst("difference, in units of 1e-9 px");
   long pixels_seen = 0;
-  const long cases = holds([&] {
+  const long cases = holds(1, [&] {
     const auto [a, b] = draw_pair();
     for (const Vector3d& ray : many(genRayFor(a))) {
       if (atBound(a, ray)) continue;
@@ -986,7 +974,7 @@ void agreesWithOpenCv(
         projectPoints,
     double max_angle) {
   Worst worst("difference to OpenCV, in units of 1e-9 px");
-  const long cases = holds([&] {
+  const long cases = holds(1, [&] {
     const Camera camera = *genCamera<M>(Range::kRealistic);
     std::vector<cv::Point3d> points;
     std::vector<Vector2d> ours;
