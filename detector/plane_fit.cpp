@@ -54,6 +54,7 @@ std::optional<PlaneFit> fitInFrame(const Eigen::Matrix3d& M,
     if (!(length > 0)) return std::nullopt;
     v1 /= length;
     v2 /= length;
+    if (DLSD_MUTANT("plane-turned")) v2 *= 1 + 1e-6;
     const double n0 = -(k1 * v1 + k2 * v2) / d;
     n = {n0, v1, v2};
     const double step = (mu - lambda) / (1 + n0 * n0);
