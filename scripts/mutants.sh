@@ -3,12 +3,17 @@
 # switches on one after the other (properties/mutants.tsv) and demands that its test fails, with the
 # number of cases of the quick preset, while it passes without.
 #   scripts/mutants.sh [NAME...]      all, or the named ones
-# Prints a table, with the seconds that each took; exits with 1 if a defect goes unnoticed.
+# Prints a table, with the seconds that each took; exits with 1 if a defect goes unnoticed, by any of
+# the tests that the list names for it.
 # DLSD_JOBS is the number of processes (all cores by default).
 set -euo pipefail
 cd "$(dirname "$0")/.."
 source scripts/packages.sh
 
+if [[ ${1:-} == -h || ${1:-} == --help ]]; then
+  sed -n '2,/^set/{/^set/d;s/^# \{0,1\}//;p}' scripts/mutants.sh
+  exit 0
+fi
 list=properties/mutants.tsv
 jobs=${DLSD_JOBS:-$(nproc)}
 export build=${DLSD_MUTANTS_BUILD:-build/mutants}
@@ -18,11 +23,17 @@ export RC_PARAMS="${RC_PARAMS:-seed=1 max_success=200} noshrink=1" DLSD_SHRINK_S
 # Every defect in the sources is in the list, and the other way round.
 in_sources=$(grep -rhoE 'DLSD_MUTANT\("[a-z0-9-]+"\)' --include='*.h' --include='*.cpp' \
   cameras synth detector evaluation | grep -oE '"[^"]+"' | tr -d '"' | sort -u)
-in_list=$(grep -v '^#' $list | cut -f1 | sort)
+in_list=$(grep -v '^#' $list | cut -f1 | sort -u)
 if ! diff <(echo "$in_sources") <(echo "$in_list") >&2; then
   echo "mutants.sh: the defects in the sources (<) and in $list (>) differ" >&2
   exit 2
 fi
+for name in "$@"; do
+  if ! grep -qx -- "$name" <<<"$in_list"; then
+    echo "mutants.sh: no defect is called \"$name\"; $list has their names" >&2
+    exit 2
+  fi
+done
 wanted=$(mktemp)
 scratch=$(mktemp -d)
 trap 'rm -rf "$wanted" "$scratch"' EXIT
