@@ -55,7 +55,7 @@ function(dlsd_add_module name)
   install(TARGETS ${target} LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR}/dlsd)
 endfunction()
 
-# dlsd_add_test(NAME LABELS quick SHARDS n COST seconds SOURCES a_test.cpp ... LIBS ...)
+# dlsd_add_test(NAME LABELS quick nightly SHARDS n COST seconds SOURCES a_test.cpp ... LIBS ...)
 # One GoogleTest binary; each of its tests becomes a ctest of its own, or with SHARDS each n-th part of them: OpenCV's
 # larger libraries take 0.06 s to load, longer than many tests. COST is about how long the longest of them takes:
 # ctest -j starts long tests first, and knows them by itself only the second time. Found only when DLSD_TESTS is on.
@@ -77,8 +77,13 @@ function(dlsd_add_test name)
   target_link_libraries(${name} PRIVATE ${ARG_LIBS} GTest::gmock GTest::gtest_main dlsd_warnings)
   target_compile_definitions(${name} PRIVATE DLSD_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
   if(NOT ARG_SHARDS)
-    gtest_discover_tests(${name} DISCOVERY_TIMEOUT 60
-                         PROPERTIES LABELS "${ARG_LABELS}" TIMEOUT ${ARG_TIMEOUT} COST ${ARG_COST})
+    gtest_discover_tests(${name} DISCOVERY_TIMEOUT 60 TEST_LIST ${name}_tests
+                         PROPERTIES TIMEOUT ${ARG_TIMEOUT} COST ${ARG_COST})
+    # gtest_discover_tests takes no property that is a list.
+    set(labels ${CMAKE_CURRENT_BINARY_DIR}/${name}_labels.cmake)
+    file(WRITE ${labels} "if(${name}_tests)
+  set_tests_properties(\${${name}_tests} PROPERTIES LABELS \"${ARG_LABELS}\")\nendif()\n")
+    set_property(DIRECTORY APPEND PROPERTY TEST_INCLUDE_FILES ${labels})
     return()
   endif()
   foreach(shard RANGE 1 ${ARG_SHARDS})
