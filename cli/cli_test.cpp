@@ -14,6 +14,7 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
+#include "cameras/calibration/files.h"
 #include "cli/cli_fixture.h"
 
 namespace {
@@ -74,6 +75,23 @@ TEST_F(Cli, UsageErrorsAreTwo) {
   expectRefused("camera", 2, "show");
   expectRefused("camera mend wide.yaml", 2, "mend");
   expectRefused("camera show", 2, "file");
+}
+
+// A saved case is judged again; that its scene is another one by now, is said.
+TEST_F(Cli, ReplayTellsAnotherScene) {
+  const std::string path = DLSD_SOURCE_DIR "/fixtures/counterexamples/recovery-room.json";
+  Result result = dlsd("replay " + path);
+  EXPECT_EQ(result.code, 0) << result.err;
+  EXPECT_THAT(result.out, testing::StartsWith("passed: "));
+  std::string text = dlsd::readFile(path);
+  const size_t at = text.rfind("room/");
+  ASSERT_NE(at, std::string::npos);
+  write("old.json", text.replace(at, 6, "room/0"));
+  result = dlsd("replay old.json");
+  EXPECT_THAT(result.out, HasSubstr("warning: the case was saved of room/0, the scene is room/"));
+  text.replace(text.rfind("versions"), 8, "Versions");
+  write("older.json", text);
+  EXPECT_THAT(dlsd("replay older.json").out, HasSubstr("saved of an unknown version"));
 }
 
 TEST_F(Cli, BadCameraFilesAreTwo) {

@@ -89,6 +89,9 @@ struct Scene {
   }
 };
 
+/// Saved cases carry it: raised with each change after which a seed paints another picture.
+inline constexpr const char* kSceneVersion = "painted/1";
+
 /// Random convex polygons (and cones) over the field of view up to `max_angle_rad` from +z.
 inline Scene randomScene(uint64_t seed, int polygons, int cones, double max_angle_rad) {
   Scene scene;

@@ -2,12 +2,19 @@
 
 #include <gtest/gtest.h>
 #include <rapidcheck.h>
+#include <unistd.h>
 
 #include <array>
+#include <filesystem>
 #include <set>
+#include <string>
 
+#include "cameras/calibration/files.h"
+#include "detector/test_scene.h"
+#include "properties/checks/counterexample.h"
 #include "properties/gen.h"
 #include "properties/holds.h"
+#include "synth/scene.h"
 
 namespace dlsd {
 namespace {
@@ -83,6 +90,36 @@ TEST(GenImage, FillsAreWhatTheySay) {
       }
     }
   }
+}
+
+// Saved cases are seeds: if this fails, kSceneVersion must be raised.
+TEST(GenImage, PaintedScenesAreThoseOfTheirVersion) {
+  const test::Scene scene = test::randomScene(1, 2, 1, 1);
+  double sum = 0;
+  for (const test::Shape& shape : scene.shapes) {
+    sum += shape.axis.x() + 2 * shape.axis.y() + 3 * shape.grey / 255 + 5 * shape.cos_radius;
+    for (const Eigen::Vector3d& vertex : shape.vertices) sum += vertex.x() + 2 * vertex.y();
+  }
+  EXPECT_STREQ(test::kSceneVersion, "painted/1");
+  EXPECT_NEAR(scene.background, 93.179651636612, 1e-9);
+  EXPECT_NEAR(sum, 10.5863002671322, 1e-9);
+}
+
+// --- Saved cases ---
+
+TEST(UnfinishedCase, IsOnDiskUntilItIsJudged) {
+  const std::string folder = testing::TempDir() + "unfinished_test";
+  std::filesystem::remove_all(folder);
+  const nlohmann::ordered_json json{{"format", "dlsd-case/1"}, {"scene", "room"}};
+  const std::string path = folder + "/unfinished-" + std::to_string(::getpid()) + ".json";
+  {
+    const UnfinishedCase unfinished(folder, json);
+    const auto saved = nlohmann::json::parse(readFile(path));
+    EXPECT_EQ(saved["format"], "dlsd-case/1");
+    EXPECT_EQ(saved["versions"]["scene"], presetVersion("room"));
+  }
+  EXPECT_FALSE(std::filesystem::exists(path));
+  std::filesystem::remove_all(folder);
 }
 
 TEST(GenImage, PartsAndScaledCamerasSeeTheSame) {

@@ -1,11 +1,13 @@
 #include "properties/checks/counterexample.h"
 
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <string_view>
 
 #include "cameras/calibration/files.h"
+#include "detector/test_scene.h"
 #include "synth/dataset/dataset.h"
 #include "synth/scene.h"
 
@@ -58,6 +60,11 @@ std::string overlaySvg(const std::vector<ShownPicture>& shown) {
 
 }  // namespace
 
+std::string sceneVersionOf(const nlohmann::json& json) {
+  return json.contains("scene") ? presetVersion(json["scene"].get<std::string>())
+                                : test::kSceneVersion;
+}
+
 std::string saveCounterexample(const std::string& parent,
                                const nlohmann::ordered_json& failing_case,
                                const std::string& failure,
@@ -67,10 +74,8 @@ std::string saveCounterexample(const std::string& parent,
   nlohmann::ordered_json text = failing_case;
   text["failure"] = failure;
   text["replay"] = "dlsd replay case.json";
-  text["versions"] = {{"dlsd", DLSD_VERSION}, {"compiler", __VERSION__}};
-  if (text.contains("scene")) {
-    text["versions"]["scene"] = presetVersion(text["scene"].get<std::string>());
-  }
+  text["versions"] = {
+      {"dlsd", DLSD_VERSION}, {"compiler", __VERSION__}, {"scene", sceneVersionOf(failing_case)}};
   makeFolders(folder);
   writeFileAtomically(folder + "/case.json", text.dump(1) + "\n");
   for (size_t i = 0; i < shown.size(); ++i) {
@@ -78,6 +83,18 @@ std::string saveCounterexample(const std::string& parent,
   }
   writeFileAtomically(folder + "/overlay.svg", overlaySvg(shown));
   return folder;
+}
+
+UnfinishedCase::UnfinishedCase(const std::string& parent, const nlohmann::ordered_json& judged)
+    : path_(fmt::format("{}/unfinished-{}.json", parent, ::getpid())) {
+  makeFolders(parent);
+  nlohmann::ordered_json text = judged;
+  text["versions"] = {{"dlsd", DLSD_VERSION}, {"scene", sceneVersionOf(judged)}};
+  writeFileAtomically(path_, text.dump(1) + "\n");
+}
+
+UnfinishedCase::~UnfinishedCase() {
+  ::unlink(path_.c_str());
 }
 
 }  // namespace dlsd

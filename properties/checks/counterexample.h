@@ -30,4 +30,21 @@ std::string saveCounterexample(const std::string& parent,
                                const std::string& failure,
                                const std::vector<ShownPicture>& shown);
 
+/// Version of what makes the case's picture: the scene preset's, or that of the painted scenes.
+[[nodiscard]] std::string sceneVersionOf(const nlohmann::json& json);
+
+/// Keeps a case on disk while it is judged, as `parent`/unfinished-<process id>.json: where the
+/// process dies (a crash, a sanitizer's report, a time limit), the file stays, and `dlsd replay`
+/// takes it. Throws SystemError.
+class UnfinishedCase {
+ public:
+  UnfinishedCase(const std::string& parent, const nlohmann::ordered_json& judged);
+  ~UnfinishedCase();
+  UnfinishedCase(const UnfinishedCase&) = delete;
+  UnfinishedCase& operator=(const UnfinishedCase&) = delete;
+
+ private:
+  std::string path_;
+};
+
 }  // namespace dlsd

@@ -3,7 +3,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <exception>
 
+#include "evaluation/detections.h"
 #include "properties/checks/picture.h"
 #include "properties/checks/recovery.h"
 #include "properties/checks/soundness.h"
@@ -32,7 +34,7 @@ void judgeRecovery(const FrameCase& frame_case, const Frame& frame, bool with_sh
   }
   v->counted = outcome.qualified;
   v->summary = fmt::format("{}/{} clear labels found", outcome.found(), outcome.qualified);
-  if (!outcome.missed_ids.empty()) v->failure = v->summary;
+  if (!outcome.missed_ids.empty()) v->noted = v->summary;
   if (with_shown) v->shown = {shownOf(frame, outcome)};
 }
 
@@ -47,8 +49,25 @@ void judgeSoundness(const FrameCase& frame_case, const Frame& frame, bool with_s
                            outcome.wrong.size(),
                            outcome.detections.size(),
                            outcome.longest_wrong_px);
-  if (!(outcome.longest_wrong_px < kLongWrongPx)) v->failure = v->summary;
+  if (!(outcome.longest_wrong_px < kLongWrongPx)) v->noted = v->summary;
   if (with_shown) v->shown = {shownOf(frame, outcome)};
+}
+
+/// The first cases of painted scenes do not say their version: it was the first. Those of presets
+/// must say it.
+std::string otherScene(const nlohmann::json& json, const std::string& source) {
+  const JsonField root(json, source);
+  const std::string is = sceneVersionOf(json);
+  const bool says = root.has("versions") && root["versions"].has("scene");
+  const std::string was = says                     ? root["versions"]["scene"].text()
+                          : json.contains("scene") ? "an unknown version of it"
+                                                   : "painted/1";
+  if (was == is) return "";
+  return fmt::format("the case was saved of {}, the scene is {} now: another picture", was, is);
+}
+
+std::string thrown(const std::exception& error) {
+  return fmt::format("an exception: {}", error.what());
 }
 
 }  // namespace
@@ -57,18 +76,32 @@ Verdict judgeCase(const nlohmann::json& json, const std::string& source, bool wi
   Verdict verdict;
   if (json.is_object() && json.contains("scene")) {
     const FrameCase frame_case = frameCaseFromJson(json, source);
-    const Frame frame = renderCase(frame_case);
     verdict.judged = toJson(frame_case);
-    if (frame_case.property == "recovery") {
-      judgeRecovery(frame_case, frame, with_shown, &verdict);
-    } else {
-      judgeSoundness(frame_case, frame, with_shown, &verdict);
+    verdict.other_scene = otherScene(json, source);
+    (void)builtinOptions(frame_case.detector);  // Unknown ones are bad input, no failure.
+    const Frame frame = renderCase(frame_case);
+    if (with_shown) verdict.shown = {{frame.image, {}, {}, {}}};
+    try {
+      if (frame_case.property == "recovery") {
+        judgeRecovery(frame_case, frame, with_shown, &verdict);
+      } else {
+        judgeSoundness(frame_case, frame, with_shown, &verdict);
+      }
+    } catch (const std::exception& error) {
+      verdict.failure = thrown(error);
     }
     return verdict;
   }
   const PictureCase picture_case = pictureCaseFromJson(json, source);
-  PictureOutcome outcome = checkPicture(picture_case, with_shown);
   verdict.judged = toJson(picture_case);
+  verdict.other_scene = otherScene(json, source);
+  PictureOutcome outcome;
+  try {
+    outcome = checkPicture(picture_case, with_shown);
+  } catch (const std::exception& error) {
+    verdict.failure = thrown(error);
+    return verdict;
+  }
   verdict.failure = outcome.failure;
   verdict.counted = outcome.counted;
   verdict.summary =

@@ -10,8 +10,13 @@
 namespace dlsd {
 
 struct Verdict {
-  nlohmann::ordered_json judged;     ///< The case as it was understood.
-  std::string failure;               ///< Empty: the property holds. Else one line.
+  nlohmann::ordered_json judged;  ///< The case as it was understood.
+  std::string failure;            ///< Empty: the property holds. Else one line.
+  /// Where the property is one of many frames, of whose lines a share may be missed or wrong: what
+  /// of this frame counts towards that share, one line. Empty: nothing.
+  std::string noted;
+  /// Where the case was saved of another version of its scene, and so of another picture: one line.
+  std::string other_scene;
   std::string summary;               ///< What was counted, one line.
   std::vector<std::string> details;  ///< A line for each thing that fails, where several can.
   /// Labels, pixels or lines of which the property speaks: 0 if the case says nothing about it.
@@ -19,8 +24,8 @@ struct Verdict {
   std::vector<ShownPicture> shown;  ///< If asked for.
 };
 
-/// Judges the case by the property that it names. Throws InputError with source, key and value for
-/// anything missing, unknown or out of range.
+/// Judges the case by the property that it names. What the detector throws is a failure. Throws
+/// InputError with source, key and value for anything missing, unknown or out of range.
 [[nodiscard]] Verdict judgeCase(const nlohmann::json& json,
                                 const std::string& source,
                                 bool with_shown);
