@@ -33,12 +33,13 @@
 namespace dlsd {
 namespace {
 
-/// A number from RC_PARAMS ("seed=1 max_success=200").
+/// A number from RC_PARAMS ("seed=1 max_success=200"): the last of that name, as RapidCheck takes
+/// it.
 std::optional<uint64_t> rcParam(const std::string& key) {
   const char* env = std::getenv("RC_PARAMS");
   std::string params = " ";
   if (env != nullptr) params += env;
-  const size_t at = params.find(" " + key + "=");
+  const size_t at = params.rfind(" " + key + "=");
   if (at == std::string::npos) return std::nullopt;
   return std::stoull(params.substr(at + key.size() + 2));
 }
