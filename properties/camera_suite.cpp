@@ -52,11 +52,13 @@ constexpr double kRayRoundTripUlps = 8;
 /// Resolution of a unit ray's own coordinates, added where the pixel is outside the image: far out,
 /// a pixel can be finer than any double ray.
 constexpr double kRayResolution = 2 * std::numeric_limits<double>::epsilon();
-/// The same for the way back from a pixel: the inverse of the double sphere takes two steps, each
-/// of which rounds.
-double inverseResolution(const Camera& camera) {
-  return std::holds_alternative<DoubleSphere>(camera.model()) ? 1.5 * kRayResolution
-                                                              : kRayResolution;
+/// The same for the way back from a pixel: the field angle rounds, and the inverse of the double
+/// sphere takes two steps, each of which rounds.
+double inverseResolution(const Camera& camera, const Vector3d& ray) {
+  const double angle = fieldAngle(ray);
+  const double ulp = std::nextafter(angle, 4) - angle;
+  const double steps = std::holds_alternative<DoubleSphere>(camera.model()) ? 1.5 : 1;
+  return std::max(steps * kRayResolution, 2 * ulp);
 }
 /// Relative band at the bounds of the domain inside which either answer is right.
 constexpr double kBand = 1e-12;
@@ -313,8 +315,8 @@ TEST_P(CameraSuite, PixelsInsideTheImageComeBack) {
         // that neighbouring pixels are.
         const auto J = camera.jacobian(*ray);
         if (!J) continue;
-        const double resolution =
-            8 * pixelUlp(camera, pixel) + singularValues(*J).largest * inverseResolution(camera);
+        const double resolution = 8 * pixelUlp(camera, pixel) +
+                                  singularValues(*J).largest * inverseResolution(camera, *ray);
         if (!(resolution <= kPixelRoundTrip)) {
           allowed = resolution;
           unresolved.see(error / allowed, kind);
@@ -354,7 +356,7 @@ TEST_P(CameraSuite, RaysComeBack) {
         const double ulps = kRayRoundTripUlps + cancellation(camera, theta) - 1;
         allowed =
             nearFold(ulps * pixelUlp(camera, *pixel) / smallest, camera.maxFieldAngle() - theta) +
-            std::max(inverseResolution(camera), 2 * ulp(theta));
+            inverseResolution(camera, ray);
       }
       (ordinary ? worst : worst_far).see(error / allowed, kind);
       if (!(error <= allowed)) {
