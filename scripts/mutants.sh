@@ -88,5 +88,6 @@ caught=$(grep -cE '^[^ ]+ +[a-z]+ +caught ' <<<"$table" || true)
 subtle=$(grep -cE '^[^ ]+ +subtle +caught ' <<<"$table" || true)
 others=$(grep -vE '^[^ ]+ +[a-z]+ +caught ' <<<"$table" | cut -d' ' -f1 | tr '\n' ' ' || true)
 echo "$SECONDS s with the build"
-echo "$caught of $(wc -l <"$wanted") caught ($subtle of them subtle)${others:+; not caught: $others}"
+echo "$(cut -f1 "$wanted" | sort -u | wc -l) defects: $caught of $(wc -l <"$wanted") tests notice theirs" \
+  "($subtle of them subtle)${others:+; not noticed: $others}"
 [[ -z $others && $caught -gt 0 ]]
