@@ -50,9 +50,12 @@ struct Seen {
   std::vector<Vector2d> curve;
 };
 
+/// All lines, or none and a failure of the case if one of them is no sound record: what is measured
+/// on lines may take for granted that they are.
 std::vector<Seen> detectIn(const Camera& camera,
                            const std::vector<float>& grey,
-                           const DetectorOptions& options) {
+                           const DetectorOptions& options,
+                           PictureOutcome* outcome) {
   Detector detector(camera, options);
   const ImageView view{grey.data(),
                        camera.width(),
@@ -61,11 +64,23 @@ std::vector<Seen> detectIn(const Camera& camera,
                        static_cast<ptrdiff_t>(sizeof(float)) * camera.width(),
                        PixelType::kF32,
                        false};
+  const std::vector<DetectedLine> lines = detector.detect(view);
+  if (const auto defect = defectOf(camera, options, lines)) {
+    if (outcome->failure.empty()) outcome->failure = *defect;
+    return {};
+  }
   std::vector<Seen> result;
-  for (const DetectedLine& line : detector.detect(view)) {
+  for (const DetectedLine& line : lines) {
     result.push_back({line, imageCurve(camera, line.arc, 0, 1, 0.02)});
   }
   return result;
+}
+
+/// The larger one; what is no number is larger than all.
+double worse(double worst, double value) {
+  return value <= worst      ? worst
+         : std::isnan(value) ? std::numeric_limits<double>::infinity()
+                             : value;
 }
 
 float bilinear(const std::vector<float>& grey, int width, int height, const Vector2d& p) {
@@ -227,7 +242,7 @@ Match nearest(const Seen& seen,
       const Vector3d tangent = n.cross(*ray).normalized(), side = ray->cross(tangent);
       const Vector2d along_px = (*J * tangent).normalized(), side_px = *J * side;
       const double scale = std::abs(side_px.x() * along_px.y() - side_px.y() * along_px.x());
-      across = std::max(across, std::abs(candidate.line.arc.angleToPlane(*ray)) * scale);
+      across = worse(across, std::abs(candidate.line.arc.angleToPlane(*ray)) * scale);
     }
     if (!(across < std::max(best.across_px, same_px))) continue;
     const Vector2d a = forward(seen.line.from_px), b = forward(seen.line.to_px);
@@ -275,8 +290,13 @@ struct View {
   const std::vector<float> grey;
   const std::vector<Seen> lines;
 
-  View(const Camera& its_camera, std::vector<float> its_grey, const DetectorOptions& options)
-      : camera(its_camera), grey(std::move(its_grey)), lines(detectIn(camera, grey, options)) {}
+  View(const Camera& its_camera,
+       std::vector<float> its_grey,
+       const DetectorOptions& options,
+       PictureOutcome* outcome)
+      : camera(its_camera),
+        grey(std::move(its_grey)),
+        lines(detectIn(camera, grey, options, outcome)) {}
   [[nodiscard]] bool isIsolated(const Seen& seen) const {
     return dlsd::isIsolated(seen, lines, camera, grey);
   }
@@ -448,22 +468,26 @@ PictureOutcome checkChanged(const PictureCase& c, const DetectorOptions& options
   const double angle =
       imageFieldAngle(camera) * (c.property == PictureProperty::kEmptyBorder ? 0.5 : 1);
   const Scene scene = sceneOf(c, angle);
-  const View view(camera, test::render(scene, camera), options);
+  const View view(camera, test::render(scene, camera), options, &outcome);
   Change change{samePlace, unchanged};
   switch (c.property) {
     case PictureProperty::kMirrored: {
       change.forward = [w](const Vector2d& p) { return Vector2d(w - 1 - p.x(), p.y()); };
       change.turn = [](const Vector3d& n) { return Vector3d(-n.x(), n.y(), n.z()); };
-      const View changed(
-          mirroredCamera(camera), remapped(view.grey, w, h, w, h, change.forward), options);
+      const View changed(mirroredCamera(camera),
+                         remapped(view.grey, w, h, w, h, change.forward),
+                         options,
+                         &outcome);
       compare(view, changed, change, with_shown, &outcome);
       break;
     }
     case PictureProperty::kTransposed: {
       change.forward = [](const Vector2d& p) { return Vector2d(p.y(), p.x()); };
       change.turn = [](const Vector3d& n) { return Vector3d(n.y(), n.x(), n.z()); };
-      const View changed(
-          transposedCamera(camera), remapped(view.grey, w, h, h, w, change.forward), options);
+      const View changed(transposedCamera(camera),
+                         remapped(view.grey, w, h, h, w, change.forward),
+                         options,
+                         &outcome);
       compare(view, changed, change, with_shown, &outcome);
       break;
     }
@@ -484,7 +508,7 @@ PictureOutcome checkChanged(const PictureCase& c, const DetectorOptions& options
       change.in_part = true;
       // Two paintings of 64 samples a pixel, each right to a part of this.
       change.across_px = 0.15;
-      const View changed(camera, test::render(turned, camera), options);
+      const View changed(camera, test::render(turned, camera), options, &outcome);
       compare(view, changed, change, with_shown, &outcome);
       break;
     }
@@ -526,7 +550,8 @@ PictureOutcome checkChanged(const PictureCase& c, const DetectorOptions& options
       // From the part to the whole: a line of the part that is isolated there has nothing near it
       // in the whole either, but what is cut off.
       change.forward = [=](const Vector2d& p) { return Vector2d(p.x() + left, p.y() + top); };
-      const View of_part(croppedCamera(camera, left, top, pw, ph), std::move(part), options);
+      const View of_part(
+          croppedCamera(camera, left, top, pw, ph), std::move(part), options, &outcome);
       compare(of_part, view, change, with_shown, &outcome);
       // The grid of rays lies elsewhere, by which rounding differs; where it is nearly undecided
       // whether an edge is an arc, a line more or less may be found.
@@ -545,13 +570,13 @@ PictureOutcome checkChanged(const PictureCase& c, const DetectorOptions& options
                 static_cast<float>(c.amount) * (c.inverted ? 255 - value : value);
       }
       change.polarity = c.inverted ? -1 : 1;
-      const View changed(camera, std::move(grey), options);
+      const View changed(camera, std::move(grey), options, &outcome);
       compare(view, changed, change, with_shown, &outcome);
       break;
     }
     default: {  // kOtherPinhole
       if (!c.other) throw std::invalid_argument("a property of two cameras needs the other one");
-      const View changed(*c.other, view.grey, options);
+      const View changed(*c.other, view.grey, options, &outcome);
       compare(view, changed, change, with_shown, &outcome);
       break;
     }
@@ -571,8 +596,8 @@ PictureOutcome checkOtherCamera(const PictureCase& c,
   if (!c.other) throw std::invalid_argument("a property of two cameras needs the other one");
   PictureOutcome outcome;
   const Scene scene = sceneOf(c, std::min(imageFieldAngle(c.camera), imageFieldAngle(*c.other)));
-  const View first(c.camera, test::render(scene, c.camera), options);
-  const View second(*c.other, test::render(scene, *c.other), options);
+  const View first(c.camera, test::render(scene, c.camera), options, &outcome);
+  const View second(*c.other, test::render(scene, *c.other), options, &outcome);
   ShownPicture shown;
   if (with_shown) shown = first.shown();
   for (const Seen& seen : first.lines) {
@@ -592,7 +617,7 @@ PictureOutcome checkOtherCamera(const PictureCase& c,
       double off = 0, coarsest = 0;
       for (const double t : {0.25, 0.5, 0.75}) {
         const Vector3d ray = arc.at(t);
-        off = std::max(off, std::abs(other.line.arc.angleToPlane(ray)));
+        off = worse(off, std::abs(other.line.arc.angleToPlane(ray)));
         for (const Camera* camera : {&c.camera, &*c.other}) {
           const auto J = camera->jacobian(ray);
           if (!J) continue;
@@ -636,7 +661,8 @@ PictureOutcome checkEquation8(const PictureCase& c,
                               const DetectorOptions& options,
                               bool with_shown) {
   PictureOutcome outcome;
-  const View view(c.camera, test::render(sceneOf(c, imageFieldAngle(c.camera)), c.camera), options);
+  const View view(
+      c.camera, test::render(sceneOf(c, imageFieldAngle(c.camera)), c.camera), options, &outcome);
   const double rho_px = options.validation.rho_px;
   const int w = c.camera.width(), h = c.camera.height();
   ShownPicture shown;
@@ -696,7 +722,8 @@ PictureOutcome checkStraight(const PictureCase& c,
                              const DetectorOptions& options,
                              bool with_shown) {
   PictureOutcome outcome;
-  const View view(c.camera, test::render(sceneOf(c, imageFieldAngle(c.camera)), c.camera), options);
+  const View view(
+      c.camera, test::render(sceneOf(c, imageFieldAngle(c.camera)), c.camera), options, &outcome);
   const int w = c.camera.width(), h = c.camera.height();
   ShownPicture shown;
   if (with_shown) shown = view.shown();
@@ -740,7 +767,7 @@ PictureOutcome checkStraight(const PictureCase& c,
     double across = 0;
     for (int i = 0; i <= 10; ++i) {
       const auto p = c.camera.project(seen.line.arc.at(i / 10.0));
-      across = p ? std::max(across, std::abs(normal.dot(*p - mean)))
+      across = p ? worse(across, std::abs(normal.dot(*p - mean)))
                  : std::numeric_limits<double>::infinity();
     }
     outcome.across_px.push_back(across);
@@ -790,7 +817,8 @@ PictureOutcome checkPaintedAgain(const PictureCase& c,
                                  bool with_shown) {
   constexpr double kPaintedAcrossPx = 0.2;
   PictureOutcome outcome;
-  const View view(c.camera, test::render(sceneOf(c, imageFieldAngle(c.camera)), c.camera), options);
+  const View view(
+      c.camera, test::render(sceneOf(c, imageFieldAngle(c.camera)), c.camera), options, &outcome);
   ShownPicture shown;
   if (with_shown) shown = view.shown();
   for (const Seen& seen : view.lines) {
@@ -802,7 +830,7 @@ PictureOutcome checkPaintedAgain(const PictureCase& c,
     scene.background = 60;
     const Vector3d centre = (*corners)[0] + (*corners)[1] + (*corners)[2];
     scene.shapes.push_back({*corners, centre.normalized(), 1, 200});
-    const View again(c.camera, test::render(scene, c.camera), options);
+    const View again(c.camera, test::render(scene, c.camera), options, &outcome);
     const Match match = nearest(seen, c.camera, samePlace, again.lines, c.camera, kPaintedAcrossPx);
     if (!(match.across_px <= kPaintedAcrossPx) || !(match.ends_px <= kMostEndsPx)) {
       failAt(seen,
@@ -852,8 +880,8 @@ double longestStraightPiece(const Camera& camera, const test::Shape& cone, doubl
     scales.push_back(J ? Eigen::JacobiSVD<ProjectionJacobian>(*J).singularValues()(1) : 0.0);
     pixels.push_back(J && isClear(camera, *p, kFilterPx) ? p : std::nullopt);
   }
-  // The longest run of outline points that lie within rho_px of the plane through the run's
-  // quarter points (which halves the sagitta), by two pointers.
+  // From each outline point on, as far as the run's middle is within 2 rho_px of the plane through
+  // its ends: the plane half way between that one and the tangent plane is within rho_px of all.
   double longest = 0;
   for (int i = 0; i < kPoints; ++i) {
     double length = 0;
@@ -862,7 +890,6 @@ double longestStraightPiece(const Camera& camera, const test::Shape& cone, doubl
       if (!pixels[index(n - 1)] || !pixels[index(n)]) break;
       length += (*pixels[index(n)] - *pixels[index(n - 1)]).norm();
       if (n < 4) continue;
-      // Between the chord's plane and the tangent plane in its middle.
       const Vector3d chord = rays[index(0)].cross(rays[index(n)]).normalized();
       const double sagitta =
           std::abs(std::asin(std::clamp(chord.dot(rays[index(n / 2)]), -1.0, 1.0))) *
@@ -880,7 +907,7 @@ PictureOutcome checkCurved(const PictureCase& c, const DetectorOptions& options,
   const test::Shape& cone = scene.shapes[0];
   outcome.applies = std::abs(cone.grey - scene.background) >= 25;
   if (!outcome.applies) return outcome;
-  const View view(c.camera, test::render(scene, c.camera), options);
+  const View view(c.camera, test::render(scene, c.camera), options, &outcome);
   ShownPicture shown;
   if (with_shown) shown = view.shown();
   constexpr double kRowsPx = 4;
@@ -904,39 +931,6 @@ PictureOutcome checkCurved(const PictureCase& c, const DetectorOptions& options,
 }
 
 // --- Any picture ---
-
-/// What is wrong with the lines of a picture, if anything.
-std::optional<std::string> defectOf(const Camera& camera,
-                                    const DetectorOptions& options,
-                                    const std::vector<DetectedLine>& lines) {
-  double previous_score = std::numeric_limits<double>::infinity();
-  for (const DetectedLine& line : lines) {
-    const bool finite = line.arc.normal.allFinite() && line.arc.from.allFinite() &&
-                        line.arc.to.allFinite() && line.from_px.allFinite() &&
-                        line.to_px.allFinite() && line.normal_cov.allFinite() &&
-                        std::isfinite(line.rms_px) && std::isfinite(line.max_px) &&
-                        std::isfinite(line.length_px) && std::isfinite(line.score);
-    if (!finite) return "a value that is no finite number";
-    if (!(std::abs(line.arc.normal.norm() - 1) <= 1e-12)) return "a normal that is no unit vector";
-    if (!(std::abs(line.arc.normal.dot(line.arc.from)) <= 1e-12)) return "a start off the plane";
-    if (!(std::abs(line.arc.normal.dot(line.arc.to)) <= 1e-12)) return "an end off the plane";
-    if (camera.project(line.arc.from) != line.from_px) return "a start that is not its ray's pixel";
-    if (camera.project(line.arc.to) != line.to_px) return "an end that is not its ray's pixel";
-    if (!camera.inImage(line.from_px) || !camera.inImage(line.to_px)) return "an end off the image";
-    if (!(line.rms_px <= line.max_px)) return "rms > max";
-    // The paper looks at the ends of straight pieces only.
-    if (options.method == DetectorOptions::Method::kPlanarPieces &&
-        !(line.max_px <= 2 * options.validation.rho_px)) {
-      return "a residual of more than 2 rho";
-    }
-    if (!(line.length_px > 0)) return "no length";
-    if (line.polarity != 1 && line.polarity != -1) return "no polarity";
-    if (!(line.score <= previous_score)) return "scores that rise";
-    previous_score = line.score;
-    if (imageSpans(camera, line.arc).size() != 1) return "an arc that leaves the image";
-  }
-  return std::nullopt;
-}
 
 bool same(const DetectedLine& a, const DetectedLine& b) {
   return a.arc.normal == b.arc.normal && a.arc.from == b.arc.from && a.arc.to == b.arc.to &&
@@ -1027,6 +1021,38 @@ std::optional<PictureProperty> picturePropertyFromName(std::string_view name) {
   const auto found = std::find(kNames.begin(), kNames.end(), name);
   if (found == kNames.end()) return std::nullopt;
   return static_cast<PictureProperty>(found - kNames.begin());
+}
+
+std::optional<std::string> defectOf(const Camera& camera,
+                                    const DetectorOptions& options,
+                                    const std::vector<DetectedLine>& lines) {
+  double previous_score = std::numeric_limits<double>::infinity();
+  for (const DetectedLine& line : lines) {
+    const bool finite = line.arc.normal.allFinite() && line.arc.from.allFinite() &&
+                        line.arc.to.allFinite() && line.from_px.allFinite() &&
+                        line.to_px.allFinite() && line.normal_cov.allFinite() &&
+                        std::isfinite(line.rms_px) && std::isfinite(line.max_px) &&
+                        std::isfinite(line.length_px) && std::isfinite(line.score);
+    if (!finite) return "a value that is no finite number";
+    if (!(std::abs(line.arc.normal.norm() - 1) <= 1e-12)) return "a normal that is no unit vector";
+    if (!(std::abs(line.arc.normal.dot(line.arc.from)) <= 1e-12)) return "a start off the plane";
+    if (!(std::abs(line.arc.normal.dot(line.arc.to)) <= 1e-12)) return "an end off the plane";
+    if (camera.project(line.arc.from) != line.from_px) return "a start that is not its ray's pixel";
+    if (camera.project(line.arc.to) != line.to_px) return "an end that is not its ray's pixel";
+    if (!camera.inImage(line.from_px) || !camera.inImage(line.to_px)) return "an end off the image";
+    if (!(line.rms_px <= line.max_px)) return "rms > max";
+    // The paper looks at the ends of straight pieces only.
+    if (options.method == DetectorOptions::Method::kPlanarPieces &&
+        !(line.max_px <= 2 * options.validation.rho_px)) {
+      return "a residual of more than 2 rho";
+    }
+    if (!(line.length_px > 0)) return "no length";
+    if (line.polarity != 1 && line.polarity != -1) return "no polarity";
+    if (!(line.score <= previous_score)) return "scores that rise";
+    previous_score = line.score;
+    if (imageSpans(camera, line.arc).size() != 1) return "an arc that leaves the image";
+  }
+  return std::nullopt;
 }
 
 nlohmann::ordered_json toJson(const PictureCase& c) {

@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "cameras/camera.h"
+#include "detector/detector.h"
 #include "properties/checks/counterexample.h"
 #include "properties/checks/test_image.h"
 
@@ -84,6 +85,12 @@ inline constexpr double kAcrossPx = 0.1, kEndsPx = 2, kMostEndsPx = 16;
 /// average it is 1 at most, which is for many pictures to show.)
 inline constexpr double kLongLinePx = 40;
 inline constexpr long kMostNoiseLines = 8;
+
+/// What is wrong with the records of the lines that were found in a picture, if anything: values
+/// that are not finite, or that do not fit each other, the camera or the options.
+[[nodiscard]] std::optional<std::string> defectOf(const Camera& camera,
+                                                  const DetectorOptions& options,
+                                                  const std::vector<DetectedLine>& lines);
 
 /// Makes the case's pictures, runs the detector on them and judges. `with_shown`: fills in `shown`.
 [[nodiscard]] PictureOutcome checkPicture(const PictureCase& picture_case, bool with_shown = false);
