@@ -30,7 +30,7 @@ int replay(const Options& options) {
   } else if (!verdict.noted.empty()) {
     print("noted: " + verdict.noted + " (of many frames, a share may be)\n");
   } else {
-    print("passed: " + verdict.summary + "\n");
+    print((verdict.is_judged ? "passed: " : "nothing to judge: ") + verdict.summary + "\n");
   }
   return verdict.failure.empty() ? kDone : kCheckFailed;
 }
@@ -48,7 +48,8 @@ Run addReplay(CLI::App& command) {
       "  dlsd replay fixtures/counterexamples/x.json\n"
       "  dlsd replay case.json --out look      then open overlay.svg: what fails is red\n\n"
       "docs/properties.md explains the properties. Exit code 1 if the case still fails; 0, and\n"
-      "\"noted\", if labels are missed or lines are wrong of which a share of many frames may be.");
+      "\"noted\", if labels are missed or lines are wrong of which a share of many frames may be.\n"
+      "\"nothing to judge\": the property speaks of nothing that is in the case's pictures.");
   return [options] { return replay(*options); };
 }
 

@@ -42,7 +42,7 @@ INSTANTIATE_TEST_SUITE_P(,
 
 /// Sums over the cases of a property.
 struct Tally {
-  long cases = 0, counted = 0, long_lines = 0;
+  long cases = 0, counted = 0, uncompared = 0, long_lines = 0;
   std::vector<double> across_px, ends_px, shares;
 };
 
@@ -64,6 +64,7 @@ Tally expectHolds(double share, const std::function<PictureCase()>& draw) {
     // What RapidCheck tries after a failure is no case.
     if (failed) return;
     tally.counted += outcome.counted;
+    tally.uncompared += outcome.uncompared;
     tally.long_lines += outcome.long_lines;
     const auto add = [](const std::vector<double>& values, Worst* worst, std::vector<double>* all) {
       for (const double value : values) worst->see(value);
@@ -79,7 +80,8 @@ Tally expectHolds(double share, const std::function<PictureCase()>& draw) {
     ADD_FAILURE() << failure << "\ndlsd replay "
                   << std::filesystem::absolute(folder + "/case.json").string();
   }
-  std::cout << "    " << tally.counted << " counted in " << tally.cases << " pictures\n";
+  std::cout << "    " << tally.counted << " counted in " << tally.cases << " pictures, "
+            << tally.uncompared << " of them not compared\n";
   return tally;
 }
 
@@ -92,20 +94,25 @@ void expectMost(const std::vector<double>& values,
   const auto within =
       std::count_if(values.begin(), values.end(), [&](double value) { return value <= bound; });
   const auto count = static_cast<double>(values.size());
+  EXPECT_GE(values.size(), 1U) << what;
   EXPECT_GE(static_cast<double>(within), share * count - 3 * std::sqrt(share * (1 - share) * count))
       << what;
   std::cout << "    " << within << "/" << values.size() << " " << what << " within " << bound
             << "\n";
 }
 
-/// Some views are too narrow for an isolated line of 60 px.
-void expectEnough(const Tally& tally) {
-  EXPECT_GE(tally.counted, tally.cases / 40);
+/// As many lines were judged as the pictures of that model have, and at least one.
+/// @param per_picture  The fewest lines per picture that any model has: some views are too narrow
+///   for an isolated line of 60 px, and in a panorama few sides are as long. Their number varies by
+///   twice what independent lines would; three standard deviations less are no failure.
+void expectEnough(long judged, const Tally& tally, double per_picture) {
+  const double expected = per_picture * static_cast<double>(tally.cases);
+  EXPECT_GE(static_cast<double>(judged), std::max(1.0, expected - 3 * std::sqrt(2 * expected)));
 }
 
 /// The ends of the isolated lines are where they were.
-void expectSameEnds(const Tally& tally) {
-  expectEnough(tally);
+void expectSameEnds(const Tally& tally, double per_picture) {
+  expectEnough(tally.counted, tally, per_picture);
   expectMost(tally.ends_px, kEndsPx, 0.9, "ends, px,");
   expectMost(tally.ends_px, 5, 0.98, "ends, px,");
 }
@@ -148,7 +155,7 @@ TEST_P(PictureSuite, AnyPictureIsAnswered) {
     if (*genInt(0, 3) == 3) picture_case.detector = "dlsd-paper";
     return picture_case;
   });
-  EXPECT_GT(tally.counted, tally.cases / 40);
+  expectEnough(tally.counted, tally, 0.15);
 }
 
 // At most one line of 40 px per picture on average, no more than 3 of any length.
@@ -177,14 +184,15 @@ TEST(Pictures, NoiseIsNoLine) {
 }
 
 TEST_P(PictureSuite, AMirroredPictureHasTheMirroredLines) {
-  expectSameEnds(expectHolds(0.1, [] { return drawCase(PictureProperty::kMirrored, GetParam()); }));
+  expectSameEnds(expectHolds(0.1, [] { return drawCase(PictureProperty::kMirrored, GetParam()); }),
+                 0.2);
 }
 
 // Together with mirroring: turns by 90 degrees. Not for panoramas, whose two directions differ.
 TEST_P(PictureSuite, ATransposedPictureHasTheTransposedLines) {
   if (GetParam() == Equirectangular::kName) GTEST_SKIP() << "longitude is not latitude";
   expectSameEnds(
-      expectHolds(0.1, [] { return drawCase(PictureProperty::kTransposed, GetParam()); }));
+      expectHolds(0.1, [] { return drawCase(PictureProperty::kTransposed, GetParam()); }), 0.35);
 }
 
 TEST_P(PictureSuite, ASceneTurnedAboutTheAxisHasTheTurnedLines) {
@@ -194,17 +202,20 @@ TEST_P(PictureSuite, ASceneTurnedAboutTheAxisHasTheTurnedLines) {
     picture_case.amount = *genReal(0, 2 * M_PI);
     return picture_case;
   });
-  expectEnough(tally);
+  expectEnough(tally.counted, tally, 0.3);
   expectMost(tally.ends_px, kEndsPx, 0.8, "ends, px,");
 }
 
 TEST_P(PictureSuite, APartOfThePictureHasItsLines) {
-  expectSameEnds(expectHolds(0.1, [] {
-    PictureCase picture_case = drawCase(PictureProperty::kPart, GetParam());
-    picture_case.left = *genInt(0, picture_case.camera.width() / 4);
-    picture_case.top = *genInt(0, picture_case.camera.height() / 4);
-    return picture_case;
-  }));
+  expectSameEnds(expectHolds(0.1,
+                             [] {
+                               PictureCase picture_case =
+                                   drawCase(PictureProperty::kPart, GetParam());
+                               picture_case.left = *genInt(0, picture_case.camera.width() / 4);
+                               picture_case.top = *genInt(0, picture_case.camera.height() / 4);
+                               return picture_case;
+                             }),
+                 0.1);
 }
 
 TEST_P(PictureSuite, WithoutItsEmptyBorderAPictureHasTheSameLines) {
@@ -213,69 +224,85 @@ TEST_P(PictureSuite, WithoutItsEmptyBorderAPictureHasTheSameLines) {
     picture_case.left = *genInt(16, 40);
     return picture_case;
   });
-  EXPECT_GE(tally.counted, std::max(1L, tally.cases / 4));
-  EXPECT_GE(tally.across_px.size(), 1U);  // Isolated lines.
+  expectEnough(tally.counted, tally, 5);
+  // Isolated ones, whose places are compared.
+  expectEnough(tally.counted - tally.uncompared, tally, 0.15);
   expectMost(tally.across_px, 0.01, 0.98, "across, px,");
 }
 
 TEST_P(PictureSuite, BrightnessContrastAndInversionDoNotMatter) {
-  expectSameEnds(expectHolds(0.1, [] {
-    PictureCase picture_case = drawCase(PictureProperty::kGreyLevels, GetParam());
-    picture_case.inverted = *genInt(0, 1) == 1;
-    picture_case.amount = *genReal(0.6, 1);
-    picture_case.offset = *genReal(0, 255 * (1 - picture_case.amount));
-    return picture_case;
-  }));
+  expectSameEnds(expectHolds(0.1,
+                             [] {
+                               PictureCase picture_case =
+                                   drawCase(PictureProperty::kGreyLevels, GetParam());
+                               picture_case.inverted = *genInt(0, 1) == 1;
+                               picture_case.amount = *genReal(0.6, 1);
+                               picture_case.offset = *genReal(0, 255 * (1 - picture_case.amount));
+                               return picture_case;
+                             }),
+                 0.2);
 }
 
 TEST(Pictures, AllPinholesSeeTheSameLines) {
-  expectSameEnds(expectHolds(0.2, [] {
-    PictureCase picture_case = drawCase(PictureProperty::kOtherPinhole, "pinhole");
-    const int width = picture_case.camera.width(), height = picture_case.camera.height();
-    picture_case.other = Camera(
-        Pinhole{*genReal(150, 2000), *genReal(150, 2000), *genReal(0, width), *genReal(0, height)},
-        width,
-        height);
-    return picture_case;
-  }));
+  expectSameEnds(expectHolds(0.2,
+                             [] {
+                               PictureCase picture_case =
+                                   drawCase(PictureProperty::kOtherPinhole, "pinhole");
+                               const int width = picture_case.camera.width(),
+                                         height = picture_case.camera.height();
+                               picture_case.other = Camera(Pinhole{*genReal(150, 2000),
+                                                                   *genReal(150, 2000),
+                                                                   *genReal(0, width),
+                                                                   *genReal(0, height)},
+                                                           width,
+                                                           height);
+                               return picture_case;
+                             }),
+                 0.5);
 }
 
 TEST(Pictures, LinesOfAPinholeAreStraight) {
   const Tally tally =
       expectHolds(0.2, [] { return drawCase(PictureProperty::kStraight, "pinhole"); });
-  EXPECT_GE(tally.counted, std::max(1L, tally.cases / 4));
+  expectEnough(tally.counted, tally, 0.5);
+  EXPECT_LE(tally.uncompared, 1 + tally.counted / 50) << "lines have no measured edge";
 }
 
 TEST_P(PictureSuite, AnotherCameraSeesTheSameArcs) {
   const Tally tally = expectHolds(0.1, [] {
-    PictureCase picture_case = drawCase(PictureProperty::kOtherCamera, GetParam());
-    picture_case.other = *genSmallCamera("kannala_brandt", kSide);
+    // Sides long enough in both pictures are rare in smaller ones.
+    constexpr int kLargerSide = 480;
+    PictureCase picture_case =
+        drawCase(PictureProperty::kOtherCamera, *genSmallCamera(GetParam(), kLargerSide));
+    picture_case.other = *genSmallCamera(*rc::gen::elementOf(cameraModelNames()), kLargerSide);
     return picture_case;
   });
-  EXPECT_GE(tally.counted, std::max(1L, tally.cases / 40));
+  expectEnough(tally.counted, tally, 0.15);
   expectMost(tally.shares, 1, 0.995, "angles over 0.15 px");
 }
 
 TEST_P(PictureSuite, EveryPixelOfALineKeepsEquation8) {
   const Tally tally =
       expectHolds(0.1, [] { return drawCase(PictureProperty::kEquation8, GetParam()); });
-  EXPECT_GE(tally.counted, tally.cases * 20);
+  EXPECT_GE(tally.counted, tally.cases * 50);
   expectMost(tally.shares, 0.02, 0.98, "shares without an edge");
 }
 
 TEST_P(PictureSuite, ALineThatIsPaintedAloneIsFoundAgain) {
   const Tally tally =
       expectHolds(0.1, [] { return drawCase(PictureProperty::kPaintedAgain, GetParam()); });
-  EXPECT_GE(tally.counted, std::max(1L, tally.cases / 40));
+  expectEnough(tally.counted, tally, 0.15);
   expectMost(tally.ends_px, 5, 0.9, "ends, px,");
 }
 
 TEST_P(PictureSuite, CurvedThingsGiveNoLongLines) {
-  expectHolds(0.1, [] {
+  const Tally tally = expectHolds(0.5, [] {
     return PictureCase{.property = PictureProperty::kCurved,
                        .camera = *genSmallCamera(GetParam(), kSide),
                        .seed = genSeed()};
   });
+  // Pieces of the outlines that are straight enough: few, but not none.
+  expectEnough(tally.counted, tally, 0.03);
 }
 
 // NaN passes many a comparison: whatever a record holds must be seen to be wrong.

@@ -33,6 +33,7 @@ void judgeRecovery(const FrameCase& frame_case, const Frame& frame, bool with_sh
                                      pieceOf(label.points)));
   }
   v->counted = outcome.qualified;
+  v->is_judged = v->counted > 0;
   v->summary = fmt::format("{}/{} clear labels found", outcome.found(), outcome.qualified);
   if (!outcome.missed_ids.empty()) v->noted = v->summary;
   if (with_shown) v->shown = {shownOf(frame, outcome)};
@@ -45,6 +46,7 @@ void judgeSoundness(const FrameCase& frame_case, const Frame& frame, bool with_s
     v->details.push_back(fmt::format("on no label: {}", pieceOf(line.points)));
   }
   v->counted = static_cast<long>(outcome.detections.size());
+  v->is_judged = v->counted > 0;
   v->summary = fmt::format("{}/{} detections on no label, the longest of {:.0f} px",
                            outcome.wrong.size(),
                            outcome.detections.size(),
@@ -104,10 +106,13 @@ Verdict judgeCase(const nlohmann::json& json, const std::string& source, bool wi
   }
   verdict.failure = outcome.failure;
   verdict.counted = outcome.counted;
-  verdict.summary =
-      outcome.applies
-          ? fmt::format("{}, {} counted", nameOf(picture_case.property), outcome.counted)
-          : "the case says nothing about the property";
+  // That a picture is answered, and that noise is no line, is judged without any line.
+  const bool by_places = picture_case.property != PictureProperty::kEmptyBorder;
+  verdict.is_judged = outcome.applies && (takesImage(picture_case.property) ||
+                                          outcome.counted > (by_places ? outcome.uncompared : 0));
+  verdict.summary = fmt::format("{}, {} counted", nameOf(picture_case.property), outcome.counted);
+  if (outcome.uncompared > 0)
+    verdict.summary += fmt::format(", {} of them not compared", outcome.uncompared);
   verdict.shown = std::move(outcome.shown);
   return verdict;
 }

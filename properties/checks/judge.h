@@ -19,8 +19,10 @@ struct Verdict {
   std::string other_scene;
   std::string summary;               ///< What was counted, one line.
   std::vector<std::string> details;  ///< A line for each thing that fails, where several can.
-  /// Labels, pixels or lines of which the property speaks: 0 if the case says nothing about it.
+  /// Labels, pixels or lines of which the property speaks.
   long counted = 0;
+  /// False: the case says nothing about the property, e.g. because nothing was painted, or found.
+  bool is_judged = false;
   std::vector<ShownPicture> shown;  ///< If asked for.
 };
 

@@ -556,7 +556,10 @@ PictureOutcome checkChanged(const PictureCase& c, const DetectorOptions& options
       // The grid of rays lies elsewhere, by which rounding differs; where it is nearly undecided
       // whether an edge is an arc, a line more or less may be found.
       const size_t with = view.lines.size(), without = of_part.lines.size();
-      if (is_empty) outcome.counted = static_cast<long>(std::max(with, without));
+      if (is_empty) {
+        outcome.counted = static_cast<long>(std::max(with, without));
+        outcome.uncompared = outcome.counted - static_cast<long>(outcome.across_px.size());
+      }
       if (is_empty && std::max(with, without) > std::min(with, without) + 1 &&
           outcome.failure.empty()) {
         outcome.failure = fmt::format("{} lines with the border, {} without it", with, without);
@@ -589,6 +592,25 @@ PictureOutcome checkChanged(const PictureCase& c, const DetectorOptions& options
 // Of the coarser camera. What hides behind the last px of an edge in one picture, and not in the
 // other, may turn a line a little more.
 constexpr double kOtherCameraPx = 0.15, kOtherCameraWorst = 2;
+
+/// Whether a picture shows the middle half of an arc as an edge that should be found: 40 px long,
+/// clear of border and rim, of 25 grey levels and even on both sides.
+bool showsEdge(const View& view, const Arc& arc) {
+  const auto middle = arcBetween(arc.at(0.25), arc.at(0.75));
+  if (!middle) return false;
+  DetectedLine line;
+  line.arc = *middle;
+  auto previous = view.camera.project(middle->from);
+  constexpr int kPieces = 20;
+  for (int i = 0; i <= kPieces; ++i) {
+    const auto p = view.camera.project(middle->at(static_cast<double>(i) / kPieces));
+    if (!p || !previous || !isClear(view.camera, *p, 12)) return false;
+    line.length_px += (*p - *previous).norm();
+    previous = p;
+  }
+  return line.length_px >= 40 && contrastAlong(view.grey, view.camera, *middle) >= 25 &&
+         isEvenBeside(view.grey, view.camera, line, 0);
+}
 
 PictureOutcome checkOtherCamera(const PictureCase& c,
                                 const DetectorOptions& options,
@@ -630,9 +652,14 @@ PictureOutcome checkOtherCamera(const PictureCase& c,
         allowed = kOtherCameraPx * coarsest;
       }
     }
-    // Else it is a line of another edge, and this one is not seen there.
-    if (!(best <= 20 * allowed)) continue;
+    // Else it is a line of another edge, and this one is missing.
+    const bool is_found = best <= 20 * allowed;
+    if (!is_found && !showsEdge(second, arc)) continue;
     ++outcome.counted;
+    if (!is_found) {
+      failAt(seen, "missing in the other picture, which shows it", &shown, &outcome);
+      continue;
+    }
     outcome.shares.push_back(best / allowed);
     if (!(best <= kOtherCameraWorst * allowed)) {
       failAt(seen, fmt::format("{:.3g} of {:.3g} rad", best, allowed), &shown, &outcome);
@@ -730,6 +757,7 @@ PictureOutcome checkStraight(const PictureCase& c,
   for (const Seen& seen : view.lines) {
     if (!view.isIsolated(seen)) continue;
     ++outcome.counted;
+    ++outcome.uncompared;  // Until its edge is measured.
     // Where the grey levels step, every px along the straight piece between the line's ends but for
     // 12 px at each: the mean place of their change from 4 px before to 4 px behind.
     const Vector2d from = seen.line.from_px, d = seen.line.to_px - from;
@@ -764,6 +792,7 @@ PictureOutcome checkStraight(const PictureCase& c,
       normal = Eigen::JacobiSVD<Eigen::Matrix2d>(scatter, Eigen::ComputeFullU).matrixU().col(1);
     }
     if (points.size() < 20) continue;
+    --outcome.uncompared;
     double across = 0;
     for (int i = 0; i <= 10; ++i) {
       const auto p = c.camera.project(seen.line.arc.at(i / 10.0));
@@ -1005,10 +1034,6 @@ PictureOutcome checkTestImage(const PictureCase& c,
   return outcome;
 }
 
-bool takesImage(PictureProperty property) {
-  return property == PictureProperty::kAnyPicture || property == PictureProperty::kNoise;
-}
-
 constexpr std::array<const char*, 3> kTypeNames{"u8", "u16", "f32"};
 
 }  // namespace
@@ -1053,6 +1078,10 @@ std::optional<std::string> defectOf(const Camera& camera,
     if (imageSpans(camera, line.arc).size() != 1) return "an arc that leaves the image";
   }
   return std::nullopt;
+}
+
+bool takesImage(PictureProperty property) {
+  return property == PictureProperty::kAnyPicture || property == PictureProperty::kNoise;
 }
 
 nlohmann::ordered_json toJson(const PictureCase& c) {

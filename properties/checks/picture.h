@@ -40,6 +40,9 @@ inline constexpr int kPicturePropertyCount = 14;
 [[nodiscard]] std::string_view nameOf(PictureProperty property);
 [[nodiscard]] std::optional<PictureProperty> picturePropertyFromName(std::string_view name);
 
+/// Whether the property is of a picture that no scene made.
+[[nodiscard]] bool takesImage(PictureProperty property);
+
 /// Everything that is needed to judge a property again. What a property does not read stays at its
 /// default.
 struct PictureCase {
@@ -68,6 +71,9 @@ struct PictureOutcome {
   /// Of what the property speaks: isolated lines, pixels of lines (kEquation8), or all lines
   /// (kAnyPicture, kNoise, kCurved, kEmptyBorder).
   long counted = 0;
+  /// Of these, lines whose places are not compared: without a measured edge (kStraight), or not
+  /// isolated (kEmptyBorder, which compares their number all the same).
+  long uncompared = 0;
   long long_lines = 0;  ///< kNoise: of 40 px or more.
   /// Of each isolated line that was compared; ends of the properties that compare them.
   std::vector<double> across_px, ends_px;
