@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 
 #include "properties/gen.h"
 
@@ -23,6 +24,20 @@ rc::Gen<TestImageSpec> genTestImage(int max_side) {
     const double noise_sigma = *genReal(0, 80), blur_px = *genReal(0, 1.5);
     return TestImageSpec{
         fill, width, height, channels, type, padding, bgr, seed, noise_sigma, blur_px};
+  });
+}
+
+rc::Gen<TestImageSpec> genNoise(Fill kind, int width, int height) {
+  return rc::gen::exec([=] {
+    TestImageSpec image{.fill = kind, .width = width, .height = height};
+    image.seed = static_cast<uint64_t>(*genInt(0, 1 << 30));
+    image.noise_sigma = *genReal(0.3, 60);
+    if (kind == Fill::kBlurredNoise) {
+      image.blur_px = *genReal(0, 1.5);
+      image.noise_sigma /= blurGain(image.blur_px);
+    }
+    if (kind == Fill::kShotNoise) image.noise_sigma = 128 / std::sqrt(*genReal(1, 60));
+    return image;
   });
 }
 

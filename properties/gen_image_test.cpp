@@ -4,7 +4,9 @@
 #include <rapidcheck.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <filesystem>
 #include <set>
 #include <string>
@@ -120,6 +122,50 @@ TEST(UnfinishedCase, IsOnDiskUntilItIsJudged) {
   }
   EXPECT_FALSE(std::filesystem::exists(path));
   std::filesystem::remove_all(folder);
+}
+
+// The distribution, not only its spread: the chance of so many electrons, of 1 and 49 on average.
+TEST(GenImage, ShotNoiseIsPoisson) {
+  for (const double mean : {1.0, 49.0}) {
+    const std::vector<float> grey = filled(Fill::kShotNoise, 500, 400, 7, 128 / std::sqrt(mean), 0);
+    const auto n = static_cast<double>(grey.size());
+    double probability = std::exp(-mean);
+    for (int count = 0; count * 128 / mean < 255; ++count) {
+      if (count > 0) probability *= mean / count;
+      const double level = count * 128 / mean;
+      const auto found = static_cast<double>(std::count_if(grey.begin(), grey.end(), [&](float g) {
+        return std::abs(static_cast<double>(g) - level) < 0.01;
+      }));
+      EXPECT_LE(std::abs(found - n * probability), 5 * std::sqrt(n * probability) + 5)
+          << count << " of " << mean;
+    }
+  }
+}
+
+// What is rounded to 8 bits is still noise.
+TEST(GenImage, NoiseIsAsStrongAsStated) {
+  for (const Fill kind : kNoiseFills) {
+    for (uint64_t seed = 0; seed < 200; ++seed) {
+      const TestImageSpec spec = genNoise(kind, 100, 100)(rc::Random(seed), 100).value();
+      const TestImage image = makeTestImage(spec);
+      double sum = 0, squares = 0;
+      for (const std::byte byte : image.bytes) {
+        const auto value = static_cast<double>(byte);
+        sum += value;
+        squares += value * value;
+      }
+      const auto n = static_cast<double>(image.bytes.size());
+      const double variance = squares / n - sum / n * (sum / n);
+      if (kind != Fill::kSaltAndPepper) {
+        EXPECT_GE(variance, 0.05) << spec;
+      }
+      if (kind == Fill::kBlurredNoise) {
+        // Rounding adds a twelfth, or takes the most of what is much below a level.
+        const double sigma = spec.noise_sigma * blurGain(spec.blur_px);
+        EXPECT_LE(std::abs(std::sqrt(variance) - sigma), 0.15 + 0.15 * sigma) << spec;
+      }
+    }
+  }
 }
 
 TEST(GenImage, PartsAndScaledCamerasSeeTheSame) {

@@ -8,6 +8,7 @@
 #include <array>
 #include <cmath>
 #include <cstring>
+#include <ctime>
 #include <functional>
 #include <limits>
 #include <stdexcept>
@@ -998,6 +999,20 @@ ShownPicture shownOf(const TestImage& image, const Camera& camera, const auto& l
   return shown;
 }
 
+/// Checked builds take many times as long.
+constexpr double kBuildSlowness =
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__) || !defined(NDEBUG)
+    20;
+#else
+    1;
+#endif
+
+/// Processor time that a detector and its first picture may take: far more than it does, but no
+/// minutes.
+double allowedSeconds(const TestImageSpec& image) {
+  return kBuildSlowness * (2 + 20e-6 * image.width * image.height);
+}
+
 PictureOutcome checkTestImage(const PictureCase& c,
                               const DetectorOptions& options,
                               bool with_shown) {
@@ -1006,8 +1021,11 @@ PictureOutcome checkTestImage(const PictureCase& c,
   if (image.width != c.camera.width() || image.height != c.camera.height()) {
     throw std::invalid_argument("the camera's size is not the picture's");
   }
+  const std::clock_t start = std::clock();
   Detector detector(c.camera, options);
   const std::vector<DetectedLine> lines = detector.detect(image.view());
+  const double seconds = static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC;
+  outcome.seconds_share = seconds / allowedSeconds(c.image);
   outcome.counted = static_cast<long>(lines.size());
   for (const DetectedLine& line : lines) {
     outcome.long_lines += line.length_px >= kLongLinePx ? 1 : 0;
@@ -1029,6 +1047,10 @@ PictureOutcome checkTestImage(const PictureCase& c,
     } else if (defect) {
       outcome.failure = *defect;
     }
+  }
+  if (!(outcome.seconds_share <= 1) && outcome.failure.empty()) {
+    outcome.failure =
+        fmt::format("{:.1f} s of processor time, allowed {:.1f}", seconds, allowedSeconds(c.image));
   }
   if (with_shown) outcome.shown = {shownOf(image, c.camera, lines)};
   return outcome;

@@ -21,7 +21,7 @@
 namespace dlsd {
 
 enum class PictureProperty {
-  kAnyPicture,    ///< Finite, consistent records, the same ones again; image: `image`.
+  kAnyPicture,    ///< Finite, consistent records, the same ones again, in time; image: `image`.
   kNoise,         ///< Few lines of 40 px; image: `image`.
   kMirrored,      ///< Mirrored left to right: the mirrored lines.
   kTransposed,    ///< Rows and columns exchanged. Ignores skew; not for panoramas.
@@ -74,7 +74,8 @@ struct PictureOutcome {
   /// Of these, lines whose places are not compared: without a measured edge (kStraight), or not
   /// isolated (kEmptyBorder, which compares their number all the same).
   long uncompared = 0;
-  long long_lines = 0;  ///< kNoise: of 40 px or more.
+  double seconds_share = 0;  ///< kAnyPicture, kNoise: processor time over what is allowed.
+  long long_lines = 0;       ///< kNoise: of 40 px or more.
   /// Of each isolated line that was compared; ends of the properties that compare them.
   std::vector<double> across_px, ends_px;
   /// kOtherCamera: angle over the allowed one; kEquation8: share of a line without an edge;

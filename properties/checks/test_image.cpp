@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstring>
+#include <numeric>
 #include <ostream>
 
 #include "synth/dataset/random.h"
@@ -20,22 +21,29 @@ constexpr std::array<std::string_view, kFillCount> kNames{"constant",
                                                           "white noise",
                                                           "blurred noise",
                                                           "salt and pepper",
-                                                          "random bytes"};
+                                                          "random bytes",
+                                                          "shot noise"};
 
 size_t sizeOf(PixelType type) {
   return type == PixelType::kU8 ? 1 : type == PixelType::kU16 ? 2 : 4;
 }
 
-/// Gaussian blur, borders repeated.
-void blur(std::vector<float>* image, int width, int height, double sigma_px) {
-  if (!(sigma_px > 0)) return;
+/// Samples of a Gaussian out to four standard deviations.
+std::vector<float> kernelOf(double sigma_px) {
+  if (!(sigma_px > 0)) return {1};
   const int radius = static_cast<int>(std::ceil(4 * sigma_px));
   std::vector<float> kernel;
-  float sum = 0;
   for (int i = -radius; i <= radius; ++i) {
     kernel.push_back(static_cast<float>(std::exp(-0.5 * i * i / (sigma_px * sigma_px))));
-    sum += kernel.back();
   }
+  return kernel;
+}
+
+/// Gaussian blur, borders repeated.
+void blur(std::vector<float>* image, int width, int height, double sigma_px) {
+  const std::vector<float> kernel = kernelOf(sigma_px);
+  const int radius = static_cast<int>(kernel.size() / 2);
+  const float sum = std::accumulate(kernel.begin(), kernel.end(), 0.0F);
   std::vector<float> pass(image->size());
   for (const bool along_x : {true, false}) {
     for (int y = 0; y < height; ++y) {
@@ -54,6 +62,28 @@ void blur(std::vector<float>* image, int width, int height, double sigma_px) {
     }
     image->swap(pass);
   }
+}
+
+/// The number of electrons whose cumulative Poisson probability first exceeds u in [0, 1).
+int poissonQuantile(double mean, double u) {
+  double probability = std::exp(-mean), cumulative = probability;
+  int count = 0;
+  // Sums of rounded probabilities may stay below u for ever: 1e-16 is left far before the bound.
+  const int most = static_cast<int>(mean + 12 * std::sqrt(mean) + 30);
+  while (u >= cumulative && count < most) {
+    ++count;
+    probability *= mean / count;
+    cumulative += probability;
+  }
+  return count;
+}
+
+/// Grey level of a pixel in shot noise of this spread around 128.
+double shotNoiseAt(const Random& noise, uint64_t i, double sigma) {
+  constexpr double kMean = 128, kNormalFrom = 50;
+  const double electrons = (kMean / sigma) * (kMean / sigma);
+  if (!(electrons < kNormalFrom)) return kMean + sigma * noise.normal(i);
+  return kMean / electrons * poissonQuantile(electrons, noise.uniform(i, 0, 1));
 }
 
 size_t indexOf(std::span<const ParamSpec> specs, std::string_view name) {
@@ -131,6 +161,9 @@ std::vector<float> filled(
         case Fill::kBlurredNoise:
           value = 128 + noise_sigma * noise.normal(i);
           break;
+        case Fill::kShotNoise:
+          value = shotNoiseAt(noise, i, noise_sigma);
+          break;
         case Fill::kSaltAndPepper: {
           const double draw = noise.uniform(i, 0, 1);
           value = draw < share / 2 ? 0 : draw < share ? 255 : 128;
@@ -143,6 +176,15 @@ std::vector<float> filled(
   if (fill == Fill::kBlurredNoise) blur(&grey, width, height, blur_px);
   for (float& value : grey) value = std::clamp(value, 0.0F, 255.0F);
   return grey;
+}
+
+double blurGain(double blur_px) {
+  double sum = 0, squares = 0;
+  for (const float value : kernelOf(blur_px)) {
+    sum += static_cast<double>(value);
+    squares += static_cast<double>(value) * static_cast<double>(value);
+  }
+  return squares / (sum * sum);  // Of two passes.
 }
 
 TestImage makeTestImage(const TestImageSpec& spec) {

@@ -25,8 +25,9 @@ enum class Fill {
   kBlurredNoise,
   kSaltAndPepper,
   kRandomBytes,
+  kShotNoise,
 };
-inline constexpr int kFillCount = 10;
+inline constexpr int kFillCount = 11;
 [[nodiscard]] std::string_view nameOf(Fill fill);
 [[nodiscard]] std::optional<Fill> fillFromName(std::string_view name);
 
@@ -61,9 +62,13 @@ inline void showValue(const TestImageSpec& spec, std::ostream& out) {
 }
 
 /// Grey levels in [0, 255], row-major: a fill with its own parameters drawn from (seed, pixel).
-/// noise_sigma: of kWhiteNoise and kBlurredNoise (before the blur of blur_px).
+/// noise_sigma: of kWhiteNoise, kBlurredNoise (before the blur of blur_px) and kShotNoise (Poisson
+/// counts with a mean of 128 grey levels, so many electrons that this is their spread).
 [[nodiscard]] std::vector<float> filled(
     Fill fill, int width, int height, uint64_t seed, double noise_sigma, double blur_px);
+
+/// Standard deviation that the blur of kBlurredNoise leaves of white noise of 1.
+[[nodiscard]] double blurGain(double blur_px);
 
 [[nodiscard]] TestImage makeTestImage(const TestImageSpec& spec);
 
