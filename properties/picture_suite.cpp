@@ -11,6 +11,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <exception>
 #include <filesystem>
 #include <functional>
 #include <iostream>
@@ -21,6 +22,8 @@
 #include "cameras/calibration/files.h"
 #include "detector/options.h"
 #include "properties/checks/case.h"
+#include "properties/checks/counterexample.h"
+#include "properties/checks/judge.h"
 #include "properties/checks/picture.h"
 #include "properties/gen.h"
 #include "properties/gen_image.h"
@@ -55,7 +58,13 @@ Tally expectHolds(double share, const std::function<PictureCase()>& draw) {
       ends("at the ends, px"), shares("share of what is allowed");
   tally.cases = holds(share, [&] {
     const PictureCase picture_case = draw();
-    const PictureOutcome outcome = checkPicture(picture_case);
+    const UnfinishedCase unfinished("counterexamples", toJson(picture_case));
+    PictureOutcome outcome;
+    try {
+      outcome = checkPicture(picture_case);
+    } catch (const std::exception& e) {
+      outcome.failure = std::string("an exception: ") + e.what();
+    }
     if (!outcome.failure.empty()) {
       failed.emplace(picture_case);
       failure = outcome.failure;
@@ -77,8 +86,9 @@ Tally expectHolds(double share, const std::function<PictureCase()>& draw) {
     add(outcome.shares, &shares, &tally.shares);
   });
   if (failed) {
-    const std::string folder = saveCounterexample(
-        "counterexamples", toJson(*failed), failure, checkPicture(*failed, true).shown);
+    const nlohmann::ordered_json json = toJson(*failed);
+    const std::string folder =
+        saveCounterexample("counterexamples", json, failure, judgeCase(json, "case", true).shown);
     ADD_FAILURE() << failure << "\ndlsd replay "
                   << std::filesystem::absolute(folder + "/case.json").string();
   }
