@@ -438,41 +438,75 @@ bool LineTracer::cutEnds(Front* front, Front* back) {
 }
 
 /// Residuals of an arc of radius r and length l against its best plane are a parabola of height
-/// (sagitta) l^2 / (8 r), which is fitted here.
+/// (sagitta) l^2 / (8 r), which is fitted here. A quad at an end that a corner moves looks the same
+/// on a short line: where the quads between the ends say so, they alone must bend, too.
 bool LineTracer::isArc(const Eigen::Vector3d& normal) const {
-  // What the filters leave of edges without noise.
-  constexpr double kFloorPx = 0.06;
-  if (quads_.size() < 4) return false;
-  const double half_length = 0.5 * static_cast<double>(quads_.size() - 1);
+  // What the filters leave of edges without noise, and what corners move by more than that.
+  constexpr double kFloorPx = 0.06, kMovedPx2 = 0.15 * 0.15;
+  constexpr size_t kMinWithInside = 7;  // two ends, and five between them
+  const size_t size = quads_.size();
+  if (size < 4) return false;
+  const double half_length = 0.5 * static_cast<double>(size - 1);
   double length_px = 0;  // from the middle of the first to that of the last
-  double n = 0, sum_r = 0, sum_q = 0, sum_qq = 0, sum_qr = 0, sum_rr = 0, noise = 0;
-  for (size_t i = 0; i < quads_.size(); ++i) {
-    const Quad& s = quads_[i];
-    if (i > 0) length_px += kQuadPx / static_cast<double>(s.perpendicular);
-    if (!s.is_edge) continue;
-    const double t = static_cast<double>(i) / half_length - 1;  // -1 ... 1
-    const Eigen::Vector3d ray = s.ray + static_cast<double>(s.offset_px) * s.across;
-    const double q = t * t;
-    const double r = ray.dot(normal) / s.across.dot(normal) * static_cast<double>(s.perpendicular);
-    n += 1;
-    sum_r += r;
-    sum_q += q;
-    sum_qq += q * q;
-    sum_qr += q * r;
-    sum_rr += r * r;
-    noise += static_cast<double>(s.variance_px2);
+  for (size_t i = 1; i < size; ++i) {
+    length_px += kQuadPx / static_cast<double>(quads_[i].perpendicular);
   }
-  if (n < 4) return false;
-  const double qq = sum_qq - sum_q * sum_q / n;
-  const double qr = sum_qr - sum_q * sum_r / n;
-  const double rr = sum_rr - sum_r * sum_r / n;
-  if (!(qq > 0)) return false;
-  const double sagitta_px = std::abs(qr) / qq;
-  const double variance = std::max(noise / n, std::max(0.0, rr - qr * qr / qq) / (n - 3));
-  const double sigma_px = std::sqrt(variance / qq);
-  const double half_px = length_px / 2;
-  return sagitta_px > kFloorPx + 2.5 * sigma_px &&
-         half_px * half_px < 2 * sagitta_px * options_.min_bend_radius_px;
+
+  // t^2, with t from -1 to 1 along the whole line, and the residual in px.
+  const auto place = [&](size_t i) {
+    const Quad& s = quads_[i];
+    const double t = static_cast<double>(i) / half_length - 1;
+    const Eigen::Vector3d ray = s.ray + static_cast<double>(s.offset_px) * s.across;
+    return Eigen::Vector2d(
+        t * t, ray.dot(normal) / s.across.dot(normal) * static_cast<double>(s.perpendicular));
+  };
+  struct Parabola {  ///< level + height t^2
+    double level_px, height_px, sigma_px;
+  };
+  const auto fit = [&](size_t begin, size_t end) -> std::optional<Parabola> {
+    double n = 0, sum_r = 0, sum_q = 0, sum_qq = 0, sum_qr = 0, sum_rr = 0, noise = 0;
+    for (size_t i = begin; i < end; ++i) {
+      if (!quads_[i].is_edge) continue;
+      const Eigen::Vector2d at = place(i);
+      const double q = at.x(), r = at.y();
+      n += 1;
+      sum_r += r;
+      sum_q += q;
+      sum_qq += q * q;
+      sum_qr += q * r;
+      sum_rr += r * r;
+      noise += static_cast<double>(quads_[i].variance_px2);
+    }
+    if (n < 4) return std::nullopt;
+    const double qq = sum_qq - sum_q * sum_q / n;
+    const double qr = sum_qr - sum_q * sum_r / n;
+    const double rr = sum_rr - sum_r * sum_r / n;
+    if (!(qq > 0)) return std::nullopt;
+    const double variance = std::max(noise / n, std::max(0.0, rr - qr * qr / qq) / (n - 3));
+    return Parabola{(sum_r - qr / qq * sum_q) / n, qr / qq, std::sqrt(variance / qq)};
+  };
+  const auto bends = [&](size_t begin, size_t end) {
+    const auto parabola = fit(begin, end);
+    if (!parabola) return false;
+    const double share = static_cast<double>(end - begin - 1) / static_cast<double>(size - 1);
+    const double sagitta_px = std::abs(parabola->height_px);
+    const double half_px = length_px / 2;
+    return sagitta_px * share * share > kFloorPx + 2.5 * parabola->sigma_px * share * share &&
+           half_px * half_px < 2 * sagitta_px * options_.min_bend_radius_px;
+  };
+  if (!bends(0, size)) return false;
+  if (size < kMinWithInside || DLSD_MUTANT("arc-ends")) return true;
+  const auto inside = fit(1, size - 1);
+  if (!inside) return true;
+  const auto isMoved = [&](size_t i) {
+    if (!quads_[i].is_edge) return false;
+    const Eigen::Vector2d at = place(i);
+    const double off_px = at.y() - inside->level_px - inside->height_px * at.x();
+    return off_px * off_px > std::max(9 * static_cast<double>(quads_[i].variance_px2), kMovedPx2);
+  };
+  const size_t begin = isMoved(0) ? 1 : 0;
+  const size_t end = isMoved(size - 1) ? size - 1 : size;
+  return end - begin == size || bends(begin, end);
 }
 
 /// Under the background model, noise of the measured level alone, the squares of the responses add
