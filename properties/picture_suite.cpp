@@ -11,23 +11,19 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <exception>
-#include <filesystem>
 #include <functional>
 #include <iostream>
-#include <optional>
 #include <string>
 #include <vector>
 
 #include "cameras/calibration/files.h"
 #include "detector/options.h"
 #include "properties/checks/case.h"
-#include "properties/checks/counterexample.h"
-#include "properties/checks/judge.h"
 #include "properties/checks/picture.h"
 #include "properties/gen.h"
 #include "properties/gen_image.h"
 #include "properties/holds.h"
+#include "properties/saved_cases.h"
 #include "properties/worst.h"
 #include "synth/dataset/json_fields.h"
 
@@ -52,46 +48,26 @@ struct Tally {
 /// Draws cases, judges them, prints the worst figures, and saves the case if one fails.
 Tally expectHolds(double share, const std::function<PictureCase()>& draw) {
   Tally tally;
-  std::optional<PictureCase> failed;
-  std::string failure;
   Worst seconds("processor time, share of what is allowed"), across("across, px"),
       ends("at the ends, px"), shares("share of what is allowed");
-  tally.cases = holds(share, [&] {
-    const PictureCase picture_case = draw();
-    const UnfinishedCase unfinished("counterexamples", toJson(picture_case));
-    PictureOutcome outcome;
-    try {
-      outcome = checkPicture(picture_case);
-    } catch (const std::exception& e) {
-      outcome.failure = std::string("an exception: ") + e.what();
-    }
-    if (!outcome.failure.empty()) {
-      failed.emplace(picture_case);
-      failure = outcome.failure;
-      RC_FAIL(outcome.failure);
-    }
-    RC_PRE(outcome.applies);
-    // What RapidCheck tries after a failure is no case.
-    if (failed) return;
-    tally.counted += outcome.counted;
-    tally.uncompared += outcome.uncompared;
-    if (takesImage(picture_case.property)) seconds.see(outcome.seconds_share);
-    tally.long_lines += outcome.long_lines;
-    const auto add = [](const std::vector<double>& values, Worst* worst, std::vector<double>* all) {
-      for (const double value : values) worst->see(value);
-      all->insert(all->end(), values.begin(), values.end());
-    };
-    add(outcome.across_px, &across, &tally.across_px);
-    add(outcome.ends_px, &ends, &tally.ends_px);
-    add(outcome.shares, &shares, &tally.shares);
-  });
-  if (failed) {
-    const nlohmann::ordered_json json = toJson(*failed);
-    const std::string folder =
-        saveCounterexample("counterexamples", json, failure, judgeCase(json, "case", true).shown);
-    ADD_FAILURE() << failure << "\ndlsd replay "
-                  << std::filesystem::absolute(folder + "/case.json").string();
-  }
+  const auto add = [](const std::vector<double>& values, Worst* worst, std::vector<double>* all) {
+    for (const double value : values) worst->see(value);
+    all->insert(all->end(), values.begin(), values.end());
+  };
+  tally.cases = holdsOrSaves(
+      share,
+      draw,
+      [](const PictureCase& picture_case) { return checkPicture(picture_case); },
+      [&](const PictureCase& picture_case, const PictureOutcome& outcome) {
+        if (!outcome.applies) return;
+        tally.counted += outcome.counted;
+        tally.uncompared += outcome.uncompared;
+        if (takesImage(picture_case.property)) seconds.see(outcome.seconds_share);
+        tally.long_lines += outcome.long_lines;
+        add(outcome.across_px, &across, &tally.across_px);
+        add(outcome.ends_px, &ends, &tally.ends_px);
+        add(outcome.shares, &shares, &tally.shares);
+      });
   std::cout << "    " << tally.counted << " counted in " << tally.cases << " pictures, "
             << tally.uncompared << " of them not compared\n";
   return tally;

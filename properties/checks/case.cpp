@@ -5,6 +5,7 @@
 #include <stdexcept>
 
 #include "cameras/calibration/files.h"
+#include "properties/checks/labels.h"
 
 namespace dlsd {
 
@@ -55,7 +56,15 @@ ordered_json toJson(const FrameCase& frame_case) {
 FrameCase frameCaseFromJson(const nlohmann::json& json, const std::string& source) {
   const JsonField root(json, source);
   if (root["format"].text() != "dlsd-case/1") root["format"].fail("is not dlsd-case/1");
-  FrameCase frame_case{.property = root["property"].text(),
+  const std::string property = root["property"].text();
+  if (property != "recovery" && property != "soundness") {
+    std::string allowed = "recovery, soundness";
+    for (int i = 0; i < kLabelPropertyCount; ++i) {
+      allowed += ", " + std::string(nameOf(static_cast<LabelProperty>(i)));
+    }
+    root["property"].fail("is unknown for a scene: allowed is " + allowed);
+  }
+  FrameCase frame_case{.property = property,
                        .camera = cameraFromJson(root["camera"]),
                        .scene = root["scene"].text(),
                        .seed = root["seed"].counter(),
@@ -63,9 +72,6 @@ FrameCase frameCaseFromJson(const nlohmann::json& json, const std::string& sourc
                        .sensor = sensorFromJson(root["sensor"].raw(), source),
                        .variety = {},
                        .detector = root["detector"].text()};
-  if (frame_case.property != "recovery" && frame_case.property != "soundness") {
-    root["property"].fail("is unknown for a scene: allowed is recovery, soundness");
-  }
   if (root.has("distractors")) {  // Cases of the first version have none.
     const std::vector<JsonField> range = root["distractors"].array(2, 2);
     frame_case.variety.distractors = {range[0].number(), range[1].number()};

@@ -6,6 +6,7 @@
 #include <exception>
 
 #include "evaluation/detections.h"
+#include "properties/checks/labels.h"
 #include "properties/checks/picture.h"
 #include "properties/checks/recovery.h"
 #include "properties/checks/soundness.h"
@@ -72,31 +73,55 @@ std::string thrown(const std::exception& error) {
   return fmt::format("an exception: {}", error.what());
 }
 
-}  // namespace
+/// Whether the case's property is one of labels.h.
+bool isOfLabels(const nlohmann::json& json) {
+  return json.is_object() && json.contains("property") && json["property"].is_string() &&
+         labelPropertyFromName(json["property"].get<std::string>());
+}
 
-Verdict judgeCase(const nlohmann::json& json, const std::string& source, bool with_shown) {
+Verdict judgeFrame(const nlohmann::json& json, const std::string& source, bool with_shown) {
+  const FrameCase frame_case = frameCaseFromJson(json, source);
   Verdict verdict;
-  if (json.is_object() && json.contains("scene")) {
-    const FrameCase frame_case = frameCaseFromJson(json, source);
-    verdict.judged = toJson(frame_case);
-    verdict.other_scene = otherScene(json, source);
-    (void)builtinOptions(frame_case.detector);  // Unknown ones are bad input, no failure.
-    const Frame frame = renderCase(frame_case);
-    if (with_shown) verdict.shown = {{frame.image, {}, {}, {}}};
-    try {
-      if (frame_case.property == "recovery") {
-        judgeRecovery(frame_case, frame, with_shown, &verdict);
-      } else {
-        judgeSoundness(frame_case, frame, with_shown, &verdict);
-      }
-    } catch (const std::exception& error) {
-      verdict.failure = thrown(error);
+  verdict.judged = toJson(frame_case);
+  (void)builtinOptions(frame_case.detector);  // Unknown ones are bad input, no failure.
+  const Frame frame = renderCase(frame_case);
+  if (with_shown) verdict.shown = {{frame.image, {}, {}, {}}};
+  try {
+    if (frame_case.property == "recovery") {
+      judgeRecovery(frame_case, frame, with_shown, &verdict);
+    } else {
+      judgeSoundness(frame_case, frame, with_shown, &verdict);
     }
+  } catch (const std::exception& error) {
+    verdict.failure = thrown(error);
+  }
+  return verdict;
+}
+
+Verdict judgeLabels(const nlohmann::json& json, const std::string& source, bool with_shown) {
+  const LabelCase label_case = labelCaseFromJson(json, source);
+  Verdict verdict;
+  verdict.judged = toJson(label_case);
+  LabelsOutcome outcome;
+  try {
+    outcome = checkLabels(label_case, with_shown);
+  } catch (const std::exception& error) {
+    verdict.failure = thrown(error);
     return verdict;
   }
+  verdict.failure = outcome.failure;
+  verdict.details = std::move(outcome.details);
+  verdict.counted = outcome.counted;
+  verdict.is_judged = outcome.applies && outcome.counted > 0;
+  verdict.summary = fmt::format("{}, {} counted", nameOf(label_case.property), outcome.counted);
+  verdict.shown = std::move(outcome.shown);
+  return verdict;
+}
+
+Verdict judgePicture(const nlohmann::json& json, const std::string& source, bool with_shown) {
   const PictureCase picture_case = pictureCaseFromJson(json, source);
+  Verdict verdict;
   verdict.judged = toJson(picture_case);
-  verdict.other_scene = otherScene(json, source);
   PictureOutcome outcome;
   try {
     outcome = checkPicture(picture_case, with_shown);
@@ -114,6 +139,17 @@ Verdict judgeCase(const nlohmann::json& json, const std::string& source, bool wi
   if (outcome.uncompared > 0)
     verdict.summary += fmt::format(", {} of them not compared", outcome.uncompared);
   verdict.shown = std::move(outcome.shown);
+  return verdict;
+}
+
+}  // namespace
+
+Verdict judgeCase(const nlohmann::json& json, const std::string& source, bool with_shown) {
+  const bool of_scene = json.is_object() && json.contains("scene");
+  Verdict verdict = isOfLabels(json) ? judgeLabels(json, source, with_shown)
+                    : of_scene       ? judgeFrame(json, source, with_shown)
+                                     : judgePicture(json, source, with_shown);
+  verdict.other_scene = otherScene(json, source);
   return verdict;
 }
 

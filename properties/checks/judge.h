@@ -26,7 +26,8 @@ struct Verdict {
   std::vector<ShownPicture> shown;  ///< If asked for.
 };
 
-/// Judges the case by the property that it names. What the detector throws is a failure. Throws
+/// Judges the case by the property that it names. What the detector throws, or
+/// the labels, is a failure. Throws
 /// InputError with source, key and value for anything missing, unknown or out of range.
 [[nodiscard]] Verdict judgeCase(const nlohmann::json& json,
                                 const std::string& source,

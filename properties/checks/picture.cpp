@@ -341,17 +341,6 @@ Camera with(const Camera& camera, const std::vector<double>& params, int width, 
   return makeCamera(camera.modelName(), params, width, height, camera.maxFieldAngleLimit());
 }
 
-/// The camera behind a mirror: column u becomes column width - 1 - u.
-Camera mirroredCamera(const Camera& camera) {
-  std::vector<double> p = camera.params();
-  double& cx = param(p, camera, "cx");
-  cx = camera.width() - 1 - cx;
-  for (const std::string_view odd : {"p2", "skew", "d", "e"}) {
-    if (hasParam(camera, odd)) param(p, camera, odd) *= -1;
-  }
-  return with(camera, p, camera.width(), camera.height());
-}
-
 /// Without what has no counterpart when rows and columns change places.
 Camera withoutShear(const Camera& camera) {
   std::vector<double> p = camera.params();

@@ -234,4 +234,16 @@ Camera croppedCamera(const Camera& camera, int left, int top, int width, int hei
   return makeCamera(camera.modelName(), params, width, height, camera.maxFieldAngleLimit());
 }
 
+Camera mirroredCamera(const Camera& camera) {
+  std::vector<double> params = camera.params();
+  const auto specs = camera.paramSpecs();
+  for (size_t i = 0; i < params.size(); ++i) {
+    const std::string_view name = specs[i].name;
+    if (name == "cx") params[i] = camera.width() - 1 - params[i];
+    if (name == "p2" || name == "skew" || name == "d" || name == "e") params[i] *= -1;
+  }
+  return makeCamera(
+      camera.modelName(), params, camera.width(), camera.height(), camera.maxFieldAngleLimit());
+}
+
 }  // namespace dlsd

@@ -76,4 +76,7 @@ inline void showValue(const TestImageSpec& spec, std::ostream& out) {
 /// its principal point moved. May reach beyond the camera's image.
 [[nodiscard]] Camera croppedCamera(const Camera& camera, int left, int top, int width, int height);
 
+/// The camera behind a mirror: column u becomes column width - 1 - u.
+[[nodiscard]] Camera mirroredCamera(const Camera& camera);
+
 }  // namespace dlsd

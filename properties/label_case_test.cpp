@@ -1,0 +1,167 @@
+// Cases of label properties: on disk and back, with some of a scene's parts, and smaller ones.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <rapidcheck.h>
+
+#include <algorithm>
+#include <array>
+#include <iostream>
+#include <numeric>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "cameras/calibration/files.h"
+#include "properties/checks/judge.h"
+#include "properties/checks/labels.h"
+#include "properties/checks/scene_parts.h"
+#include "properties/gen.h"
+#include "properties/gen_labels.h"
+#include "properties/holds.h"
+#include "synth/dataset/json_fields.h"
+#include "synth/labels.h"
+#include "synth/shadows.h"
+#include "synth/tubes.h"
+
+namespace dlsd {
+namespace {
+
+using ::testing::HasSubstr;
+
+Labels labelsOf(SceneView view, const Camera& camera) {
+  const Raycaster raycaster(view.scene);
+  addRodSides(view.pose.position_in_world, &view.scene);
+  addShadowEdges(raycaster, &view.scene);
+  const auto spans = visibleSpans(view.scene, raycaster, camera, view.pose);
+  const Shader shader(view.scene, &raycaster);
+  return makeLabels(view.scene, raycaster, shader, camera, view.pose, SensorOptions(), spans);
+}
+
+std::vector<int> allParts(const Scene& scene) {
+  std::vector<int> parts(static_cast<size_t>(partCount(scene)));
+  std::iota(parts.begin(), parts.end(), 0);
+  return parts;
+}
+
+LabelProperty genProperty() {
+  return static_cast<LabelProperty>(*genInt(0, kLabelPropertyCount - 1));
+}
+
+/// Some of the parts, from one to all.
+std::vector<int> genSomeOf(const std::vector<int>& parts) {
+  const auto most = static_cast<int>(parts.size());
+  const int count = *genInt(1, most);
+  std::set<int> some;
+  while (static_cast<int>(some.size()) < count) {
+    some.insert(parts[static_cast<size_t>(*genInt(0, most - 1))]);
+  }
+  return {some.begin(), some.end()};
+}
+
+// --- On disk ---
+
+TEST(LabelCase, RoundTripsThroughJson) {
+  holds(1, [] {
+    LabelCase c = drawLabelCase(genProperty());
+    c.camera = *genAnyCamera(Range::kAdmissible);
+    if (*genInt(0, 1) == 1) c.parts = genSomeOf(allParts(viewOf(c).scene));
+    const auto json = toJson(c);
+    const LabelCase back = labelCaseFromJson(parseJson(json.dump(), "case"), "case");
+    RC_ASSERT(toJson(back) == json);
+    RC_ASSERT(back.camera == c.camera && back.other == c.other && back.parts == c.parts);
+  });
+}
+
+// What is wrong with a file is said with source, key, value and what is allowed.
+TEST(LabelCase, WrongInputIsNamed) {
+  const Camera camera(Pinhole{100, 100, 79.5, 59.5}, 160, 120);
+  const auto json = toJson(LabelCase{.camera = camera, .scene = "paper"});
+  const auto messageFor = [&](const char* key, const nlohmann::json& value) -> std::string {
+    nlohmann::json wrong = json;
+    wrong[key] = value;
+    try {
+      (void)judgeCase(wrong, "some.json", false);
+    } catch (const InputError& error) {
+      return error.what();
+    }
+    return "accepted";
+  };
+  EXPECT_THAT(messageFor("scene", "moon"),
+              HasSubstr("some.json: scene = \"moon\" is unknown: allowed is room,"));
+  EXPECT_THAT(messageFor("property", "labels-odd"), HasSubstr("labels-complete"));
+  EXPECT_THAT(messageFor("property", "labels-other-lens"), HasSubstr("other_camera"));
+  EXPECT_THAT(messageFor("seed", -1), HasSubstr("seed"));
+  EXPECT_THAT(messageFor("things_on_top", 2), HasSubstr("things_on_top"));
+  EXPECT_THAT(messageFor("parts", nlohmann::json{0, 1000}), HasSubstr("parts[1] = 1000"));
+  EXPECT_THAT(messageFor("parts", nlohmann::json{1, 1}), HasSubstr("is not in ascending order"));
+  EXPECT_EQ(messageFor("seed", 3U), "accepted");
+}
+
+// --- Parts of scenes ---
+
+TEST(SceneParts, AllOfThemAreTheScene) {
+  holds(0.1, [] {
+    const LabelCase c = drawLabelCase(LabelProperty::kOnBorders);
+    const SceneView view = viewOf(c);
+    const Scene same = withParts(view.scene, allParts(view.scene));
+    RC_ASSERT(same.triangles.size() == view.scene.triangles.size());
+    RC_ASSERT(same.faces.size() == view.scene.faces.size());
+    RC_ASSERT(same.edges.size() == view.scene.edges.size());
+    const Labels a = labelsOf(view, c.camera), b = labelsOf({same, view.pose}, c.camera);
+    RC_ASSERT(a.lines.size() == b.lines.size());
+    for (size_t i = 0; i < a.lines.size(); ++i) {
+      RC_ASSERT(a.lines[i].edge == b.lines[i].edge);
+      RC_ASSERT(a.lines[i].points == b.lines[i].points);
+      RC_ASSERT(a.lines[i].contrast == b.lines[i].contrast);
+    }
+  });
+}
+
+// Whatever is taken out of a scene, its labels are true of what is left.
+TEST(SceneParts, SomeOfThemAreAScene) {
+  long judged = 0;
+  holds(0.1, [&] {
+    LabelCase c = drawLabelCase(genProperty());
+    c.parts = genSomeOf(allParts(viewOf(c).scene));
+    const Scene scene = viewOf(c).scene;
+    for (const Triangle& t : scene.triangles) {
+      RC_ASSERT(t.face >= 0 && t.face < static_cast<int>(scene.faces.size()));
+    }
+    for (const Edge& edge : scene.edges) {
+      RC_ASSERT(std::max(edge.face0, edge.face1) < static_cast<int>(scene.faces.size()));
+      RC_ASSERT(edge.rod < static_cast<int>(scene.rods.size()));
+    }
+    const LabelsOutcome outcome = checkLabels(c);
+    RC_LOG() << toJson(c).dump() << "\n";
+    RC_ASSERT(outcome.failure == "");
+    judged += outcome.applies ? outcome.counted : 0;
+  });
+  EXPECT_GT(judged, 1000);
+}
+
+// A defect that needs two things of a scene, seen in one corner of the picture, is shown by little
+// more than these.
+TEST(SceneParts, FailingCasesShrinkToFew) {
+  const Camera camera(Pinhole{301.5, 299.25, 200.5, 140.5}, 400, 300);
+  LabelCase c{.camera = camera, .scene = "room", .seed = 3, .index = 5, .things_on_top = true};
+  const int count = partCount(viewOf(c).scene);
+  ASSERT_GT(count, 20);
+  const auto fails = [&](const LabelCase& tried) {
+    const auto has = [&](int part) {
+      return !tried.parts || std::count(tried.parts->begin(), tried.parts->end(), part) > 0;
+    };
+    return has(3) && has(count - 2) && tried.camera.width() >= 100;
+  };
+  for (bool is_simpler = true; is_simpler;) {
+    const std::vector<LabelCase> simpler = simplerCases(c);
+    const auto found = std::find_if(simpler.begin(), simpler.end(), fails);
+    is_simpler = found != simpler.end();
+    if (is_simpler) c = *found;
+  }
+  EXPECT_EQ(c.parts, (std::vector<int>{3, count - 2}));
+  EXPECT_EQ(c.camera, Camera(Pinhole{50, 50, 49.5, 18}, 100, 37));
+}
+
+}  // namespace
+}  // namespace dlsd
