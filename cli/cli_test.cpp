@@ -94,6 +94,28 @@ TEST_F(Cli, ReplayTellsAnotherScene) {
   EXPECT_THAT(dlsd("replay older.json").out, HasSubstr("saved of an unknown version"));
 }
 
+// Cases of labels are judged as those of the detector are: passed, failed, refused.
+TEST_F(Cli, ReplayJudgesLabels) {
+  const std::string saved = DLSD_SOURCE_DIR "/fixtures/counterexamples/";
+  const Result passed = dlsd("replay " + saved + "labels-complete-shadow-of-a-bar.json --out look");
+  EXPECT_EQ(passed.code, 0) << passed.err;
+  EXPECT_THAT(passed.out, HasSubstr("\npassed: labels-complete, "));
+  const std::string look = passed.out.substr(0, passed.out.find('\n'));
+  EXPECT_THAT(contentOf(folder / look / "overlay.svg"), HasSubstr("<polyline"));
+  EXPECT_EQ(look + "\n" + dlsd("replay " + look + "/case.json").out, passed.out);
+  // There is no camera behind the mirror: its principal point would be out of range.
+  auto json =
+      nlohmann::json::parse(dlsd::readFile(saved + "labels-mirrored-ball-behind-a-bar.json"));
+  json["camera"]["params"]["cx"] = -1e6;
+  write("failing.json", json.dump());
+  const Result failed = dlsd("replay failing.json");
+  EXPECT_EQ(failed.code, 1);
+  EXPECT_THAT(failed.out, testing::StartsWith("failed: an exception: "));
+  json["scene"] = "moon";
+  write("moon.json", json.dump());
+  expectRefused("replay moon.json", 2, "moon.json: scene = \"moon\" is unknown: allowed is ");
+}
+
 TEST_F(Cli, BadCameraFilesAreTwo) {
   write("truncated.yaml", std::string(kWide).substr(0, 70));
   write("not.yaml", "cam0: [1, 2\n");

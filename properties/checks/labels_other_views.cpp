@@ -92,93 +92,97 @@ struct TwoViews {
   std::function<Vector2d(const Vector2d&)> mapPixel;  ///< Pixels likewise.
 };
 
-/// Notes the first label of `views` that is another one in the second view.
+/// What may be otherwise in few labels.
+struct Differences {
+  size_t contrast = 0, ends = 0;
+};
+
+/// How a label is another one in the second view, one line. Empty: it is the same.
+std::string differenceOf(const TwoViews& views,
+                         const LabelLine& p,
+                         const LabelLine& q,
+                         Differences* differences) {
+  if (p.edge != q.edge) return "of another edge";
+  if (p.kind != q.kind) return fmt::format("{} and {}", toString(p.kind), toString(q.kind));
+  if (p.ends != q.ends) return "with ends of other kinds";
+  // Where something begins 2e-4 rad from the line, one of its places depends on the last bit.
+  const double step = std::abs(p.contrast - q.contrast);
+  if (!(step <= 0.5 + 255.0 / kContrastPlaces)) {
+    return fmt::format("contrast {:.4g} and {:.4g}", p.contrast, q.contrast);
+  }
+  differences->contrast += step <= 0.5 + 0.1 * p.contrast ? 0 : 1;
+  for (size_t end = 0; end < 2; ++end) {
+    const Vector3d& at = p.points_in_cam[end];
+    const double off_rad = angleTo(views.map(at), q.points_in_cam[end]);
+    // Of two places at which a line may end that are nearer to each other than floats resolve, a
+    // ray test between them chooses by its last bit.
+    if (!(off_rad <= kShortestSpanRad)) return fmt::format("an end {:.3g} rad elsewhere", off_rad);
+    differences->ends += off_rad <= 1e-9 ? 0 : 1;
+    const auto J = views.camera_a.jacobian(at);
+    const double off_px = J ? J->norm() * at.norm() * off_rad : 0;
+    const auto& from = end == 0 ? p.points.front() : p.points.back();
+    const auto& to = end == 0 ? q.points.front() : q.points.back();
+    const double apart_px = (views.mapPixel(from) - to).norm();
+    if (!(apart_px <= 1e-5 + off_px)) return fmt::format("an end {:.3g} px elsewhere", apart_px);
+  }
+  return "";
+}
+
 void compareLabels(const TwoViews& views, LabelsOutcome* outcome) {
   const std::vector<LabelLine>&lines = views.a.labels.lines, &others = views.b.labels.lines;
-  const auto expect = [&](bool holds, const std::string& what) {
-    if (!holds && outcome->failure.empty()) outcome->failure = what;
-    return holds;
-  };
   outcome->counted = static_cast<long>(lines.size());
-  if (!expect(lines.size() == others.size(),
-              fmt::format("{} labels, {} in the other view", lines.size(), others.size()))) {
+  if (lines.size() != others.size()) {
+    outcome->failure = fmt::format("{} labels, {} in the other view", lines.size(), others.size());
     return;
   }
-  size_t other_contrast = 0, other_end = 0;
+  Differences differences;
   for (size_t i = 0; i < lines.size(); ++i) {
-    const LabelLine &p = lines[i], &q = others[i];
-    const std::string place = fmt::format(
-        "label {}, {} to {}: ", p.id, textOf(p.points.front()), textOf(p.points.back()));
-    bool same =
-        expect(p.edge == q.edge, place + "of another edge") &&
-        expect(
-            p.kind == q.kind,
-            place + fmt::format("{}, in the other view {}", toString(p.kind), toString(q.kind))) &&
-        expect(p.ends == q.ends, place + "with ends of other kinds");
-    // Where something begins 2e-4 rad from the line, one of its places depends on the last bit.
-    const double difference = std::abs(p.contrast - q.contrast);
-    same = same &&
-           expect(difference <= 0.5 + 255.0 / kContrastPlaces,
-                  place + fmt::format(
-                              "contrast {:.4g}, in the other view {:.4g}", p.contrast, q.contrast));
-    other_contrast += difference <= 0.5 + 0.1 * p.contrast ? 0 : 1;
-    for (size_t end = 0; same && end < 2; ++end) {
-      const Vector3d& at = p.points_in_cam[end];
-      const double off_rad = angleTo(views.map(at), q.points_in_cam[end]);
-      // Of two places at which a line may end that are nearer to each other than floats resolve, a
-      // ray test between them chooses by its last bit.
-      same = expect(off_rad <= kShortestSpanRad,
-                    place + fmt::format("an end {:.3g} rad off", off_rad));
-      other_end += off_rad <= 1e-9 ? 0 : 1;
-      const auto J = views.camera_a.jacobian(at);
-      const double off_px = J ? J->norm() * at.norm() * off_rad : 0;
-      const auto& from = end == 0 ? p.points.front() : p.points.back();
-      const auto& to = end == 0 ? q.points.front() : q.points.back();
-      const double apart_px = (views.mapPixel(from) - to).norm();
-      same = same && expect(apart_px <= 1e-5 + off_px,
-                            place + fmt::format("an end {:.3g} px off", apart_px));
-    }
-    if (same) continue;
+    const std::string what = differenceOf(views, lines[i], others[i], &differences);
+    if (what.empty()) continue;
+    outcome->failure = fmt::format("label {}, {} to {}, is another in the other view: {}",
+                                   lines[i].id,
+                                   textOf(lines[i].points.front()),
+                                   textOf(lines[i].points.back()),
+                                   what);
     if (!outcome->shown.empty()) {
-      outcome->shown[0].failed.push_back(p.points);
-      outcome->shown[1].failed.push_back(q.points);
+      outcome->shown[0].failed = {lines[i].points};
+      outcome->shown[1].failed = {others[i].points};
     }
     return;
   }
-  outcome->details.push_back(
-      fmt::format("of {} labels {} have another contrast, {} ends are elsewhere",
-                  lines.size(),
-                  other_contrast,
-                  other_end));
   const size_t most = 1 + lines.size() / 200;
-  if (!expect(other_contrast <= most && other_end <= most, outcome->details.back())) return;
-  expect(views.a.labels.junctions.size() == views.b.labels.junctions.size(),
-         "another number of junctions in the other view");
+  if (differences.contrast > most || differences.ends > most) {
+    outcome->failure = fmt::format("of {} labels {} have another contrast, {} ends are elsewhere",
+                                   lines.size(),
+                                   differences.contrast,
+                                   differences.ends);
+  } else if (views.a.labels.junctions.size() != views.b.labels.junctions.size()) {
+    outcome->failure = "another number of junctions in the other view";
+  }
 }
 
 /// Pixels that differ by more than `levels`: at most `most`.
 void comparePictures(const TwoViews& views, double levels, size_t most, LabelsOutcome* outcome) {
   const Camera& camera = views.camera_a;
   const std::vector<float> image = views.a.render(camera), other = views.b.render(views.camera_b);
-  size_t differ = 0;
+  const auto at = [&](const Vector2d& pixel) {
+    return static_cast<size_t>(pixel.y()) * static_cast<size_t>(camera.width()) +
+           static_cast<size_t>(pixel.x());
+  };
+  std::vector<Vector2d> differ;
   for (int y = 0; y < camera.height(); ++y) {
     for (int x = 0; x < camera.width(); ++x) {
-      const auto at = [&](const Vector2d& pixel) {
-        return static_cast<size_t>(pixel.y()) * static_cast<size_t>(camera.width()) +
-               static_cast<size_t>(pixel.x());
-      };
       const Vector2d pixel(x, y);
-      if (std::abs(image[at(pixel)] - other[at(views.mapPixel(pixel))]) * 255 <= levels) continue;
-      ++differ;
-      // So many that more would hide the picture.
-      if (!outcome->shown.empty() && differ <= 200) addCross(pixel, &outcome->shown[0]);
+      const float step = std::abs(image[at(pixel)] - other[at(views.mapPixel(pixel))]) * 255;
+      if (!(static_cast<double>(step) <= levels)) differ.push_back(pixel);
     }
   }
-  outcome->errors = {static_cast<double>(differ) / static_cast<double>(image.size())};
-  const std::string what = fmt::format(
-      "{} of {} pixels differ by more than {} grey levels", differ, image.size(), levels);
-  outcome->details.push_back(what);
-  if (!(differ <= most)) outcome->failure = what;
+  outcome->errors = {static_cast<double>(differ.size()) / static_cast<double>(image.size())};
+  if (differ.size() <= most) return;
+  outcome->failure = fmt::format(
+      "{} of {} pixels differ by more than {} grey levels", differ.size(), image.size(), levels);
+  if (outcome->shown.empty()) return;
+  for (const Vector2d& pixel : differ) addCross(pixel, &outcome->shown[0]);
 }
 
 LabelsOutcome compare(const TwoViews& views, double levels, size_t most_pixels, bool with_shown) {
