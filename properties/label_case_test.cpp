@@ -132,6 +132,13 @@ TEST(SceneParts, SomeOfThemAreAScene) {
       RC_ASSERT(std::max(edge.face0, edge.face1) < static_cast<int>(scene.faces.size()));
       RC_ASSERT(edge.rod < static_cast<int>(scene.rods.size()));
     }
+    long sides = 0;
+    for (const Face& face : scene.faces) {
+      for (const Decal& print : face.decals) sides += print.shape == DecalShape::kRectangle ? 4 : 0;
+    }
+    RC_ASSERT(sides == std::count_if(scene.edges.begin(), scene.edges.end(), [](const Edge& edge) {
+                return edge.source == EdgeSource::kDecal;
+              }));
     const LabelsOutcome outcome = checkLabels(c);
     RC_LOG() << toJson(c).dump() << "\n";
     RC_ASSERT(outcome.failure == "");

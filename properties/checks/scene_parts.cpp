@@ -9,7 +9,8 @@ namespace {
 
 /// The number of its part, for everything in a scene.
 struct PartNumbers {
-  std::vector<int> faces, rods, spheres, discs, tubes;
+  std::vector<int> faces, rods, spheres, discs, tubes, edges;
+  std::vector<std::vector<int>> prints;  ///< Of each face.
   int count = 0;
 };
 
@@ -52,6 +53,24 @@ PartNumbers partNumbers(const Scene& scene) {
   append(discs, tubes, &numbers.discs);
   append(tubes, leader.size(), &numbers.tubes);
   numbers.count = static_cast<int>(number_of.size());
+  for (const Face& face : scene.faces) {
+    numbers.prints.emplace_back(face.decals.size());
+    for (int& number : numbers.prints.back()) number = numbers.count++;
+  }
+  // Each rectangle brought four edges, in the order of the face's prints.
+  std::vector<size_t> print(scene.faces.size(), 0), edges_of_print(scene.faces.size(), 0);
+  for (const Edge& edge : scene.edges) {
+    if (edge.source != EdgeSource::kDecal) {
+      numbers.edges.push_back(edge.rod >= 0 ? numbers.rods[static_cast<size_t>(edge.rod)]
+                                            : numbers.faces[static_cast<size_t>(edge.face0)]);
+      continue;
+    }
+    const auto f = static_cast<size_t>(edge.face0);
+    if (edges_of_print[f] == 4) ++print[f], edges_of_print[f] = 0;
+    while (scene.faces[f].decals.at(print[f]).shape != DecalShape::kRectangle) ++print[f];
+    numbers.edges.push_back(numbers.prints[f][print[f]]);
+    ++edges_of_print[f];
+  }
   return numbers;
 }
 
@@ -86,25 +105,28 @@ Scene withParts(Scene scene, const std::vector<int>& kept) {
   const PartNumbers numbers = partNumbers(scene);
   std::vector<char> is_kept(static_cast<size_t>(numbers.count), 0);
   for (const int part : kept) is_kept.at(static_cast<size_t>(part)) = 1;
+  for (size_t f = 0; f < scene.faces.size(); ++f) {
+    keep(numbers.prints[f], is_kept, &scene.faces[f].decals);
+  }
   const std::vector<int> faces = keep(numbers.faces, is_kept, &scene.faces);
   const std::vector<int> discs = keep(numbers.discs, is_kept, &scene.discs);
   const std::vector<int> rods = keep(numbers.rods, is_kept, &scene.rods);
   keep(numbers.spheres, is_kept, &scene.spheres);
   keep(numbers.tubes, is_kept, &scene.tubes);
+  keep(numbers.edges, is_kept, &scene.edges);
   for (Rod& rod : scene.rods) {
     rod.first_face = rod.face_count > 0 ? at(faces, rod.first_face) : 0;
     rod.first_disc = at(discs, rod.first_disc);
   }
-  std::erase_if(scene.triangles, [&](const Triangle& t) { return at(faces, t.face) < 0; });
   for (Triangle& t : scene.triangles) t.face = at(faces, t.face);
-  std::erase_if(scene.edges, [&](const Edge& edge) {
-    return edge.rod >= 0 ? at(rods, edge.rod) < 0 : at(faces, edge.face0) < 0;
-  });
+  std::erase_if(scene.triangles, [](const Triangle& t) { return t.face < 0; });
   for (Edge& edge : scene.edges) {
     edge.face0 = at(faces, edge.face0);
     edge.face1 = at(faces, edge.face1);
     edge.rod = at(rods, edge.rod);
   }
+  // Those of prints whose face is gone.
+  std::erase_if(scene.edges, [](const Edge& edge) { return edge.rod < 0 && edge.face0 < 0; });
   return scene;
 }
 

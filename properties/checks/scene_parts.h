@@ -8,8 +8,8 @@
 namespace dlsd {
 
 /// How many parts a scene has that can be taken out by themselves: faces that share edges (a solid,
-/// the walls of a room), with what is printed on them; rods, with faces and caps; balls, discs,
-/// tubes.
+/// the walls of a room); rods, with faces and caps; balls, discs, tubes; and, as the last ones,
+/// prints, which go with their face, too.
 [[nodiscard]] int partCount(const Scene& scene);
 
 /// The scene with these of its parts alone. With all of them it is the same scene.
