@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "cameras/calibration/files.h"
+#include "properties/checks/case.h"
 #include "properties/checks/judge.h"
 #include "properties/checks/labels.h"
 #include "properties/checks/scene_parts.h"
@@ -145,6 +146,25 @@ TEST(SceneParts, SomeOfThemAreAScene) {
     judged += outcome.applies ? outcome.counted : 0;
   });
   EXPECT_GT(judged, 1000);
+}
+
+TEST(SceneParts, FramesAreOfSomeOfThem) {
+  FrameCase c{.property = "recovery",
+              .camera = Camera(Pinhole{100, 100, 79.5, 59.5}, 160, 120),
+              .scene = "wires",
+              .seed = 2,
+              .index = 3,
+              .sensor = {},
+              .variety = {}};
+  const Frame whole = renderCase(c);
+  c.parts = allParts(makeSceneView(c.scene, c.seed, c.index).scene);
+  EXPECT_EQ(renderCase(c).image.bytes, whole.image.bytes);
+  c.parts->resize(c.parts->size() / 2);
+  const FrameCase back = frameCaseFromJson(parseJson(toJson(c).dump(), "case"), "case");
+  EXPECT_EQ(back.parts, c.parts);
+  const Frame half = renderCase(back);
+  EXPECT_GT(half.labels.lines.size(), 0U);
+  EXPECT_LT(half.labels.lines.size(), whole.labels.lines.size());
 }
 
 // A defect that needs two things of a scene, seen in one corner of the picture, is shown by little

@@ -117,10 +117,12 @@ PixelResponse responseOf(const SensorOptions& sensor) {
 Frame makeFrame(const GenerateOptions& options,
                 uint64_t index,
                 const CameraRays& rays,
-                const PixelResponse& response) {
+                const PixelResponse& response,
+                const std::function<void(Scene*)>& change = {}) {
   const auto& [name, camera] = options.cameras[index % options.cameras.size()];
   SceneView view = makeSceneView(options.scene, options.seed, index);
   addVariety(options.variety, options.seed, index, &view);
+  if (change) change(&view.scene);
   const Raycaster raycaster(view.scene);
   addRodSides(view.pose.position_in_world, &view.scene);
   addShadowEdges(raycaster, &view.scene);
@@ -454,10 +456,12 @@ void GenerateOptions::check() const {
   }
 }
 
-Frame renderFrame(const GenerateOptions& options, uint64_t index) {
+Frame renderFrame(const GenerateOptions& options,
+                  uint64_t index,
+                  const std::function<void(Scene*)>& change) {
   options.check();
   const CameraRays rays(options.cameras[index % options.cameras.size()].second);
-  return makeFrame(options, index, rays, responseOf(options.sensor));
+  return makeFrame(options, index, rays, responseOf(options.sensor), change);
 }
 
 GenerateResult generateDataset(const GenerateOptions& options,

@@ -63,6 +63,9 @@ struct Frame {
 };
 
 /// Frame `index` as generateDataset would write it; `out`, `count` and jobs are not looked at.
-[[nodiscard]] Frame renderFrame(const GenerateOptions& options, uint64_t index);
+/// @param change  Applied to the scene before anything is made of it, if not empty.
+[[nodiscard]] Frame renderFrame(const GenerateOptions& options,
+                                uint64_t index,
+                                const std::function<void(Scene*)>& change = {});
 
 }  // namespace dlsd

@@ -2,10 +2,15 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <stdexcept>
+#include <utility>
 
 #include "cameras/calibration/files.h"
 #include "properties/checks/labels.h"
+#include "properties/checks/scene_parts.h"
+#include "synth/scene.h"
+#include "synth/variety.h"
 
 namespace dlsd {
 
@@ -41,16 +46,53 @@ Camera cameraFromJson(const JsonField& json) {
   }
 }
 
+std::string sceneFromJson(const JsonField& json) {
+  std::string scene = json.text();
+  const std::vector<std::string>& presets = scenePresets();
+  if (std::count(presets.begin(), presets.end(), scene) == 0) {
+    json.fail(fmt::format("is unknown: allowed is {}", fmt::join(presets, ", ")));
+  }
+  return scene;
+}
+
+std::vector<int> partsFromJson(const JsonField& json, const Scene& scene) {
+  const int last = partCount(scene) - 1;
+  std::vector<int> parts;
+  for (const JsonField& part : json.array()) {
+    const int number = part.integer(0, last);
+    if (!parts.empty() && number <= parts.back()) part.fail("is not in ascending order");
+    parts.push_back(number);
+  }
+  return parts;
+}
+
+namespace {
+
+GenerateOptions optionsOf(const FrameCase& frame_case) {
+  GenerateOptions options;
+  options.cameras = {{"camera", frame_case.camera}};
+  options.scene = frame_case.scene;
+  options.seed = frame_case.seed;
+  options.sensor = frame_case.sensor;
+  options.variety = frame_case.variety;
+  return options;
+}
+
+}  // namespace
+
 ordered_json toJson(const FrameCase& frame_case) {
-  return {{"format", "dlsd-case/1"},
-          {"property", frame_case.property},
-          {"camera", cameraToJson(frame_case.camera)},
-          {"scene", frame_case.scene},
-          {"seed", frame_case.seed},
-          {"index", frame_case.index},
-          {"sensor", toJson(frame_case.sensor)},
-          {"distractors", {frame_case.variety.distractors.lo, frame_case.variety.distractors.hi}},
-          {"detector", frame_case.detector}};
+  ordered_json json{
+      {"format", "dlsd-case/1"},
+      {"property", frame_case.property},
+      {"camera", cameraToJson(frame_case.camera)},
+      {"scene", frame_case.scene},
+      {"seed", frame_case.seed},
+      {"index", frame_case.index},
+      {"sensor", toJson(frame_case.sensor)},
+      {"distractors", {frame_case.variety.distractors.lo, frame_case.variety.distractors.hi}},
+      {"detector", frame_case.detector}};
+  if (frame_case.parts) json["parts"] = *frame_case.parts;
+  return json;
 }
 
 FrameCase frameCaseFromJson(const nlohmann::json& json, const std::string& source) {
@@ -66,7 +108,7 @@ FrameCase frameCaseFromJson(const nlohmann::json& json, const std::string& sourc
   }
   FrameCase frame_case{.property = property,
                        .camera = cameraFromJson(root["camera"]),
-                       .scene = root["scene"].text(),
+                       .scene = sceneFromJson(root["scene"]),
                        .seed = root["seed"].counter(),
                        .index = root["index"].counter(),
                        .sensor = sensorFromJson(root["sensor"].raw(), source),
@@ -76,17 +118,19 @@ FrameCase frameCaseFromJson(const nlohmann::json& json, const std::string& sourc
     const std::vector<JsonField> range = root["distractors"].array(2, 2);
     frame_case.variety.distractors = {range[0].number(), range[1].number()};
   }
+  if (root.has("parts")) {
+    optionsOf(frame_case).check();
+    SceneView view = makeSceneView(frame_case.scene, frame_case.seed, frame_case.index);
+    addVariety(frame_case.variety, frame_case.seed, frame_case.index, &view);
+    frame_case.parts = partsFromJson(root["parts"], view.scene);
+  }
   return frame_case;
 }
 
 Frame renderCase(const FrameCase& frame_case) {
-  GenerateOptions options;
-  options.cameras = {{"camera", frame_case.camera}};
-  options.scene = frame_case.scene;
-  options.seed = frame_case.seed;
-  options.sensor = frame_case.sensor;
-  options.variety = frame_case.variety;
-  return renderFrame(options, frame_case.index);
+  return renderFrame(optionsOf(frame_case), frame_case.index, [&](Scene* scene) {
+    if (frame_case.parts) *scene = withParts(std::move(*scene), *frame_case.parts);
+  });
 }
 
 }  // namespace dlsd

@@ -4,7 +4,9 @@
 
 #include <cstdint>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
+#include <vector>
 
 #include "cameras/camera.h"
 #include "synth/dataset/json_fields.h"
@@ -14,6 +16,10 @@ namespace dlsd {
 
 [[nodiscard]] nlohmann::ordered_json cameraToJson(const Camera& camera);
 [[nodiscard]] Camera cameraFromJson(const JsonField& json);  ///< Throws InputError.
+/// The name of a preset. Throws InputError.
+[[nodiscard]] std::string sceneFromJson(const JsonField& json);
+/// Numbers of parts (scene_parts.h) of this scene. Throws InputError.
+[[nodiscard]] std::vector<int> partsFromJson(const JsonField& json, const Scene& scene);
 
 /// What a property is checked on: a frame, made again bit for bit from these values, and the
 /// options of the detector by name.
@@ -25,6 +31,8 @@ struct FrameCase {
   SensorOptions sensor;
   SceneVariety variety;
   std::string detector = "dlsd";  ///< One of builtinDetectors().
+  /// Of the scene's parts (scene_parts.h) these alone.
+  std::optional<std::vector<int>> parts = std::nullopt;
 };
 
 [[nodiscard]] nlohmann::ordered_json toJson(const FrameCase& frame_case);

@@ -73,25 +73,13 @@ LabelCase labelCaseFromJson(const nlohmann::json& json, const std::string& sourc
   }
   LabelCase c{.property = *property,
               .camera = cameraFromJson(root["camera"]),
-              .scene = root["scene"].text(),
+              .scene = sceneFromJson(root["scene"]),
               .seed = root["seed"].counter(),
               .index = root["index"].counter(),
               .things_on_top = root["things_on_top"].integer(0, 1) == 1};
   if (root.has("other_camera")) c.other = cameraFromJson(root["other_camera"]);
   if (c.property == LabelProperty::kOtherLens && !c.other) root.fail("lacks other_camera");
-  const std::vector<std::string>& presets = scenePresets();
-  if (std::count(presets.begin(), presets.end(), c.scene) == 0) {
-    root["scene"].fail(fmt::format("is unknown: allowed is {}", fmt::join(presets, ", ")));
-  }
-  if (root.has("parts")) {
-    const int last = partCount(wholeViewOf(c).scene) - 1;
-    c.parts.emplace();
-    for (const JsonField& part : root["parts"].array()) {
-      c.parts->push_back(part.integer(0, last));
-      const size_t n = c.parts->size();
-      if (n > 1 && !((*c.parts)[n - 2] < (*c.parts)[n - 1])) part.fail("is not in ascending order");
-    }
-  }
+  if (root.has("parts")) c.parts = partsFromJson(root["parts"], wholeViewOf(c).scene);
   return c;
 }
 

@@ -66,7 +66,10 @@ PartNumbers partNumbers(const Scene& scene) {
       continue;
     }
     const auto f = static_cast<size_t>(edge.face0);
-    if (edges_of_print[f] == 4) ++print[f], edges_of_print[f] = 0;
+    if (edges_of_print[f] == 4) {
+      ++print[f];
+      edges_of_print[f] = 0;
+    }
     while (scene.faces[f].decals.at(print[f]).shape != DecalShape::kRectangle) ++print[f];
     numbers.edges.push_back(numbers.prints[f][print[f]]);
     ++edges_of_print[f];
