@@ -31,11 +31,12 @@ PartNumbers partNumbers(const Scene& scene) {
   }
   for (size_t r = 0; r < scene.rods.size(); ++r) {
     const Rod& rod = scene.rods[r];
-    for (int f = 0; f < rod.face_count; ++f) {
-      join(rods + r, static_cast<size_t>(rod.first_face + f));
+    for (int f = rod.first_face; f < rod.first_face + rod.face_count; ++f) {
+      join(rods + r, static_cast<size_t>(f));
     }
-    for (int cap = 0; rod.isRound() && cap < 2; ++cap) {
-      join(rods + r, discs + static_cast<size_t>(rod.first_disc + cap));
+    if (!rod.isRound()) continue;
+    for (int cap = rod.first_disc; cap < rod.first_disc + 2; ++cap) {
+      join(rods + r, discs + static_cast<size_t>(cap));
     }
   }
 
