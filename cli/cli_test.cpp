@@ -83,6 +83,12 @@ TEST_F(Cli, ReplayTellsAnotherScene) {
   Result result = dlsd("replay " + path);
   EXPECT_EQ(result.code, 0) << result.err;
   EXPECT_THAT(result.out, testing::StartsWith("passed: "));
+  // What it writes is a folder, which it takes, too.
+  ASSERT_EQ(dlsd("replay " + path + " --out look").code, 0);
+  result = dlsd("replay look/counterexample-*");
+  EXPECT_EQ(result.code, 0) << result.err;
+  EXPECT_THAT(result.out, testing::StartsWith("passed: "));
+  expectRefused("replay look", 2, "look/case.json");
   std::string text = dlsd::readFile(path);
   const size_t at = text.rfind("room/");
   ASSERT_NE(at, std::string::npos);

@@ -2,7 +2,10 @@
 
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
+#include <filesystem>
 #include <memory>
+#include <string>
+#include <system_error>
 
 #include "cameras/calibration/files.h"
 #include "cli/command.h"
@@ -17,8 +20,11 @@ struct Options {
 };
 
 int replay(const Options& options) {
-  const auto json = parseJson(readFile(options.path), options.path);
-  const Verdict verdict = judgeCase(json, options.path, !options.out.empty());
+  std::string path = options.path;
+  std::error_code error;
+  if (std::filesystem::is_directory(path, error)) path = std::filesystem::path(path) / "case.json";
+  const auto json = parseJson(readFile(path), path);
+  const Verdict verdict = judgeCase(json, path, !options.out.empty());
   if (!options.out.empty()) {
     const std::string& what = verdict.failure.empty() ? verdict.noted : verdict.failure;
     print(saveCounterexample(options.out, verdict.judged, what, verdict.shown) + "\n");
@@ -39,7 +45,7 @@ int replay(const Options& options) {
 
 Run addReplay(CLI::App& command) {
   auto options = std::make_shared<Options>();
-  command.add_option("case", options->path, "A case, e.g. counterexample-.../case.json")
+  command.add_option("case", options->path, "A case: counterexample-.../case.json, or its folder")
       ->required();
   command.add_option(
       "--out", options->out, "Folder in which to write the case's folder with its pictures");

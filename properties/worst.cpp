@@ -28,8 +28,12 @@ Worst::~Worst() {
   ::testing::Test::RecordProperty("worst " + what_, text.str());
   std::cout << "    worst " << what_ << ": " << text.str() << "\n";
   // One write, so that lines of tests that run side by side do not mix.
-  if (const char* path = std::getenv("DLSD_WORST"))
-    std::ofstream(path, std::ios::app) << rows.str();
+  const char* path = std::getenv("DLSD_WORST");
+  if (path == nullptr) return;
+  std::ofstream file(path, std::ios::app);
+  file << rows.str();
+  file.close();
+  EXPECT_TRUE(file) << "DLSD_WORST = \"" << path << "\" cannot be written";
 }
 
 void Worst::see(double value, size_t kind) {

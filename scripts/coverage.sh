@@ -2,7 +2,7 @@
 # Line and branch coverage of cameras, synth, detector and evaluation by their tests and the
 # property suites, with a fraction of the quick preset's cases.
 #   scripts/coverage.sh [--modules] [CTEST-ARGUMENT...]
-# --modules: only the modules' own tests, without the property suites and the program's tests.
+# --modules: only the modules' own tests and the program's, without the property suites.
 # Prints a table of modules, then the files below 95 % of lines; build/coverage/coverage.json has
 # all of it. Branches that only exceptions take are left out.
 set -euo pipefail
@@ -13,7 +13,7 @@ need_packages "${build_packages[@]}" "${test_packages[@]}" gcovr
 build=build/coverage
 folders=(.)
 if [[ ${1:-} == --modules ]]; then
-  folders=(cameras synth detector evaluation)
+  folders=(cameras synth detector evaluation cli)
   shift
 fi
 if ! configured coverage DLSD_TESTS=ON; then configure coverage DLSD_TESTS=ON; fi

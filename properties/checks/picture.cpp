@@ -955,7 +955,7 @@ bool same(const DetectedLine& a, const DetectedLine& b) {
   return a.arc.normal == b.arc.normal && a.arc.from == b.arc.from && a.arc.to == b.arc.to &&
          a.from_px == b.from_px && a.to_px == b.to_px && a.normal_cov == b.normal_cov &&
          a.rms_px == b.rms_px && a.max_px == b.max_px && a.length_px == b.length_px &&
-         a.score == b.score && a.polarity == b.polarity;
+         a.score == b.score && a.contrast == b.contrast && a.polarity == b.polarity;
 }
 
 ShownPicture shownOf(const TestImage& image, const Camera& camera, const auto& lines) {
