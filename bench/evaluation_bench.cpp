@@ -22,7 +22,7 @@ constexpr size_t kLines = 200;
 FrameEvaluation randomFrame(const Camera& camera, uint64_t index) {
   Random random(0, index);
   const auto pixel = [&] {
-    return Eigen::Vector2d(random.next(0, camera.width() - 1), random.next(0, camera.height() - 1));
+    return Eigen::Vector2d{random.next(0, camera.width() - 1), random.next(0, camera.height() - 1)};
   };
   FrameEvaluation frame;
   frame.labels.camera = "cameras/wide.yaml";
@@ -32,7 +32,7 @@ FrameEvaluation randomFrame(const Camera& camera, uint64_t index) {
   while (frame.labels.lines.size() < kLines) {
     const Eigen::Vector2d from = pixel();
     const Eigen::Vector2d to =
-        from + Eigen::Vector2d(random.next(-200, 200), random.next(-200, 200));
+        from + Eigen::Vector2d{random.next(-200, 200), random.next(-200, 200)};
     const auto ray0 = camera.unproject(from), ray1 = camera.unproject(to);
     const auto arc = ray0 && ray1 ? arcBetween(*ray0, *ray1) : std::nullopt;
     if (!arc || !camera.inImage(to)) {
@@ -47,7 +47,7 @@ FrameEvaluation randomFrame(const Camera& camera, uint64_t index) {
     line.angle_rad = arc->angle();
     line.contrast = line.contrast_min = random.next(5, 100);
     DetectionLine detection;
-    const Eigen::Vector2d shift(random.next(-2, 2), random.next(-2, 2));
+    const Eigen::Vector2d shift{random.next(-2, 2), random.next(-2, 2)};
     for (const Eigen::Vector2d& p : line.points) {
       detection.points.emplace_back(p + shift);
     }

@@ -58,8 +58,9 @@ SceneView boxesAndRods() {
   };
   std::vector<Ball> balls;
   while (balls.size() < 60) {
-    const Vector3d half(random.next(0.1, 0.5), random.next(0.1, 0.5), random.next(0.1, 0.5));
-    const Ball ball{eye + drawDirection(&random) * random.next(1.5, 6.5), half.norm()};
+    const Vector3d half{random.next(0.1, 0.5), random.next(0.1, 0.5), random.next(0.1, 0.5)};
+    const Vector3d direction = drawDirection(&random);
+    const Ball ball{eye + direction * random.next(1.5, 6.5), half.norm()};
     Frame3 frame;
     frame.origin = ball.centre;
     frame.axes =

@@ -215,7 +215,7 @@ double bruteForceAp(const std::vector<std::vector<StructuralCurve>>& labels,
 }
 
 RC_GTEST_PROP(StructuralApProperty, AgreesWithTheDefinition, ()) {
-  const auto point = [] { return Vector2d(*rc::gen::inRange(0, 40), *rc::gen::inRange(0, 40)); };
+  const auto point = [] { return Vector2d{*rc::gen::inRange(0, 40), *rc::gen::inRange(0, 40)}; };
   std::vector<std::vector<StructuralCurve>> labels, detections;
   std::vector<std::vector<double>> scores;
   std::vector<StructuralOutcome> outcomes;
@@ -227,7 +227,7 @@ RC_GTEST_PROP(StructuralApProperty, AgreesWithTheDefinition, ()) {
     auto& s = scores.emplace_back();
     for (int n = *rc::gen::inRange(0, 6); n > 0; --n) {
       const Vector2d from = point();
-      const Vector2d to = from + Vector2d(*rc::gen::inRange(10, 60), *rc::gen::inRange(-30, 30));
+      const Vector2d to = from + Vector2d{*rc::gen::inRange(10, 60), *rc::gen::inRange(-30, 30)};
       l.push_back(structuralCurve({from, (from + to) / 2 + point() / 8, to}, 128, 128));
       for (int copies = *rc::gen::inRange(0, 3); copies > 0; --copies) {
         const Vector2d shift = (point() - Vector2d(20, 20)) / 6;

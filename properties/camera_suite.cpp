@@ -726,7 +726,8 @@ Arc drawArc(const Camera& camera) {
     const int kind = *genInt(0, 3);
     if (kind < 2) to = (from + 0.7 * to).normalized();
     if (kind == 3) {
-      const Vector2d near = *genPixelOnBorder(camera) + Vector2d(*genReal(-9, 9), *genReal(-9, 9));
+      const Vector2d border = *genPixelOnBorder(camera), off{*genReal(-9, 9), *genReal(-9, 9)};
+      const Vector2d near = border + off;
       const double azimuth = *genReal(0, 2 * M_PI), length = *genReal(5, 300);
       const Vector2d step = length * Vector2d(std::cos(azimuth), std::sin(azimuth));
       from = camera.unproject(near - step).value_or(from);
