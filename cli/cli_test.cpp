@@ -98,6 +98,8 @@ TEST_F(Cli, ReplayTellsAnotherScene) {
   text.replace(text.rfind("versions"), 8, "Versions");
   write("older.json", text);
   EXPECT_THAT(dlsd("replay older.json").out, HasSubstr("saved of an unknown version"));
+  write("detector.json", text.replace(text.find("\"dlsd\""), 6, "\"lsd\""));
+  expectRefused("replay detector.json", 2, "detector.json: detector = \"lsd\" is unknown");
 }
 
 // Cases of labels are judged as those of the detector are: passed, failed, refused.

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "cameras/calibration/files.h"
+#include "evaluation/detections.h"
 #include "properties/checks/labels.h"
 #include "properties/checks/scene_parts.h"
 #include "synth/scene.h"
@@ -46,13 +47,12 @@ Camera cameraFromJson(const JsonField& json) {
   }
 }
 
-std::string sceneFromJson(const JsonField& json) {
-  std::string scene = json.text();
-  const std::vector<std::string>& presets = scenePresets();
-  if (std::count(presets.begin(), presets.end(), scene) == 0) {
-    json.fail(fmt::format("is unknown: allowed is {}", fmt::join(presets, ", ")));
+std::string oneOf(const std::vector<std::string>& names, const JsonField& json) {
+  std::string name = json.text();
+  if (std::count(names.begin(), names.end(), name) == 0) {
+    json.fail(fmt::format("is unknown: allowed is {}", fmt::join(names, ", ")));
   }
-  return scene;
+  return name;
 }
 
 std::vector<int> partsFromJson(const JsonField& json, const Scene& scene) {
@@ -106,14 +106,14 @@ FrameCase frameCaseFromJson(const nlohmann::json& json, const std::string& sourc
     }
     root["property"].fail("is unknown for a scene: allowed is " + allowed);
   }
-  FrameCase frame_case{.property = property,
-                       .camera = cameraFromJson(root["camera"]),
-                       .scene = sceneFromJson(root["scene"]),
-                       .seed = root["seed"].counter(),
-                       .index = root["index"].counter(),
-                       .sensor = sensorFromJson(root["sensor"].raw(), source),
-                       .variety = {},
-                       .detector = root["detector"].text()};
+  // One by one: where the reading of a later member throws in the braces, g++ 12 destroys what was
+  // not made.
+  FrameCase frame_case{.property = property, .camera = cameraFromJson(root["camera"])};
+  frame_case.scene = oneOf(scenePresets(), root["scene"]);
+  frame_case.seed = root["seed"].counter();
+  frame_case.index = root["index"].counter();
+  frame_case.sensor = sensorFromJson(root["sensor"].raw(), source);
+  frame_case.detector = oneOf(builtinDetectors(), root["detector"]);
   if (root.has("distractors")) {  // Cases of the first version have none.
     const std::vector<JsonField> range = root["distractors"].array(2, 2);
     frame_case.variety.distractors = {range[0].number(), range[1].number()};

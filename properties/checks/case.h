@@ -16,8 +16,8 @@ namespace dlsd {
 
 [[nodiscard]] nlohmann::ordered_json cameraToJson(const Camera& camera);
 [[nodiscard]] Camera cameraFromJson(const JsonField& json);  ///< Throws InputError.
-/// The name of a preset. Throws InputError.
-[[nodiscard]] std::string sceneFromJson(const JsonField& json);
+/// A text that must be one of these. Throws InputError.
+[[nodiscard]] std::string oneOf(const std::vector<std::string>& names, const JsonField& json);
 /// Numbers of parts (scene_parts.h) of this scene. Throws InputError.
 [[nodiscard]] std::vector<int> partsFromJson(const JsonField& json, const Scene& scene);
 

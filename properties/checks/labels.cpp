@@ -71,12 +71,11 @@ LabelCase labelCaseFromJson(const nlohmann::json& json, const std::string& sourc
   if (!property) {
     root["property"].fail(fmt::format("is unknown: allowed is {}", fmt::join(kNames, ", ")));
   }
-  LabelCase c{.property = *property,
-              .camera = cameraFromJson(root["camera"]),
-              .scene = sceneFromJson(root["scene"]),
-              .seed = root["seed"].counter(),
-              .index = root["index"].counter(),
-              .things_on_top = root["things_on_top"].integer(0, 1) == 1};
+  LabelCase c{.property = *property, .camera = cameraFromJson(root["camera"])};
+  c.scene = oneOf(scenePresets(), root["scene"]);
+  c.seed = root["seed"].counter();
+  c.index = root["index"].counter();
+  c.things_on_top = root["things_on_top"].integer(0, 1) == 1;
   if (root.has("other_camera")) c.other = cameraFromJson(root["other_camera"]);
   if (c.property == LabelProperty::kOtherLens && !c.other) root.fail("lacks other_camera");
   if (root.has("parts")) c.parts = partsFromJson(root["parts"], wholeViewOf(c).scene);

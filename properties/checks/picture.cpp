@@ -1166,7 +1166,7 @@ PictureCase pictureCaseFromJson(const nlohmann::json& json, const std::string& s
       !c.other) {
     root.fail("lacks other_camera");
   }
-  c.detector = root["detector"].text();
+  c.detector = oneOf(builtinDetectors(), root["detector"]);
   return c;
 }
 
