@@ -28,8 +28,8 @@ struct FrameCase {
   Camera camera;
   std::string scene = "room";  ///< Preset.
   uint64_t seed = 0, index = 0;
-  SensorOptions sensor;
-  SceneVariety variety;
+  SensorOptions sensor = {};
+  SceneVariety variety = {};
   std::string detector = "dlsd";  ///< One of builtinDetectors().
   /// Of the scene's parts (scene_parts.h) these alone.
   std::optional<std::vector<int>> parts = std::nullopt;
