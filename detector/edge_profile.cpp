@@ -160,7 +160,12 @@ void setTaps(const Filter& filter, size_t phase, size_t k, EdgeProfiler::Kernels
 
 }  // namespace
 
-EdgeProfiler::EdgeProfiler()
+const EdgeProfiler& EdgeProfiler::computed() {
+  static const EdgeProfiler profiler{Compute{}};
+  return profiler;
+}
+
+EdgeProfiler::EdgeProfiler(Compute)
     : measure_8_(measurePortable<uint8_t>), measure_16_(measurePortable<uint16_t>) {
 #ifdef DLSD_HAVE_AVX2_KERNELS
   if (__builtin_cpu_supports("avx2") != 0) {

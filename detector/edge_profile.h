@@ -46,7 +46,7 @@ class EdgeProfiler {
   /// not where it is 0.
   static constexpr double kBlurVariance = 0.7;
 
-  EdgeProfiler();
+  EdgeProfiler() : EdgeProfiler(computed()) {}
 
   void setPixels(const GreyPixels& pixels) { pixels_ = pixels; }
 
@@ -102,6 +102,11 @@ class EdgeProfiler {
                            EdgeResponse* responses);
 
  private:
+  struct Compute {};
+  explicit EdgeProfiler(Compute);
+  /// All are the same. Its tables are integrals, which take milliseconds.
+  static const EdgeProfiler& computed();
+
   template <class T>
   void measureTyped(const T* data,
                     const EdgeWindow& window,

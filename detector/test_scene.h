@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "cameras/arc.h"
+#include "cameras/batch.h"
 #include "cameras/camera.h"
 #include "detector/detector.h"
 
@@ -119,47 +120,39 @@ inline Scene randomScene(uint64_t seed, int polygons, int cones, double max_angl
   return scene;
 }
 
-/// Box filter over the pixel (8 x 8 samples where shapes meet), then optical blur. Pixels without
-/// a ray are black.
-inline std::vector<float> render(const Scene& scene, const Camera& camera, double blur_px = 0.7) {
-  const int w = camera.width(), h = camera.height();
-  constexpr int kNoRay = -2;
-  const auto shapeOf = [&](double u, double v) {
-    const auto ray = camera.unproject({u, v});
-    return ray ? scene.shapeAt(*ray) : kNoRay;
-  };
-  const auto greyOf = [&](int shape) { return shape == kNoRay ? 0.0 : scene.greyOf(shape); };
-  std::vector<int> shapes(static_cast<size_t>(w) * static_cast<size_t>(h));
-  const auto at = [&](int x, int y) {
-    return static_cast<size_t>(std::clamp(y, 0, h - 1)) * static_cast<size_t>(w) +
-           static_cast<size_t>(std::clamp(x, 0, w - 1));
-  };
-  for (int y = 0; y < h; ++y) {
-    for (int x = 0; x < w; ++x) shapes[at(x, y)] = shapeOf(x, y);
-  }
-  std::vector<float> image(shapes.size());
-  for (int y = 0; y < h; ++y) {
-    for (int x = 0; x < w; ++x) {
-      bool same = true;
-      for (int dy = -1; dy <= 1; ++dy) {
-        for (int dx = -1; dx <= 1; ++dx)
-          same = same && shapes[at(x + dx, y + dy)] == shapes[at(x, y)];
-      }
-      double sum = greyOf(shapes[at(x, y)]);
-      if (!same) {
-        sum = 0;
-        constexpr int kSub = 8;
-        for (int j = 0; j < kSub; ++j) {
-          for (int i = 0; i < kSub; ++i) {
-            sum += greyOf(shapeOf(x + (i + 0.5) / kSub - 0.5, y + (j + 0.5) / kSub - 0.5));
-          }
-        }
-        sum /= kSub * kSub;
-      }
-      image[at(x, y)] = static_cast<float>(sum);
+/// Which shapes the camera sees at pixels; buffers for as many as are asked for at once.
+class ShapeFinder {
+ public:
+  static constexpr int kNoRay = -2;
+
+  ShapeFinder(const Scene& scene, const Camera& camera) : scene_(scene), camera_(camera) {}
+
+  /// One per pixel: the index of a shape, -1 for the background, kNoRay.
+  void find(const std::vector<double>& u, const std::vector<double>& v, std::vector<int>* shapes) {
+    const size_t n = u.size();
+    for (std::vector<double>* axis : {&x_, &y_, &z_}) axis->resize(n);
+    valid_.resize(n);
+    shapes->resize(n);
+    unprojectAll(camera_, u, v, x_, y_, z_, valid_);
+    for (size_t i = 0; i < n; ++i) {
+      (*shapes)[i] = valid_[i] != 0 ? scene_.shapeAt({x_[i], y_[i], z_[i]}) : kNoRay;
     }
   }
-  if (!(blur_px > 0)) return image;
+
+  [[nodiscard]] double greyOf(int shape) const {
+    return shape == kNoRay ? 0.0 : scene_.greyOf(shape);
+  }
+
+ private:
+  const Scene& scene_;
+  const Camera& camera_;
+  std::vector<double> x_, y_, z_;
+  std::vector<uint8_t> valid_;
+};
+
+/// Gaussian blur out to four standard deviations, borders repeated.
+inline void blur(std::vector<float>* image, int width, int height, double blur_px) {
+  if (!(blur_px > 0)) return;
   const int radius = static_cast<int>(std::ceil(4 * blur_px));
   std::vector<float> kernel;
   float total = 0;
@@ -168,20 +161,79 @@ inline std::vector<float> render(const Scene& scene, const Camera& camera, doubl
     total += kernel.back();
   }
   for (float& k : kernel) k /= total;
-  std::vector<float> pass(image.size());
-  for (int axis = 0; axis < 2; ++axis) {
-    for (int y = 0; y < h; ++y) {
-      for (int x = 0; x < w; ++x) {
-        float sum = 0;
-        for (int i = -radius; i <= radius; ++i) {
-          sum += kernel[static_cast<size_t>(i + radius)] *
-                 image[axis == 0 ? at(x + i, y) : at(x, y + i)];
+  const size_t w = static_cast<size_t>(width), taps = kernel.size();
+  std::vector<float> pass(image->size()), padded(w + taps - 1);
+  for (size_t row = 0; row < image->size(); row += w) {
+    for (size_t i = 0; i < padded.size(); ++i) {
+      padded[i] = (*image)[row + static_cast<size_t>(
+                                     std::clamp(static_cast<int>(i) - radius, 0, width - 1))];
+    }
+    for (size_t k = 0; k < taps; ++k) {
+      for (size_t x = 0; x < w; ++x) pass[row + x] += kernel[k] * padded[x + k];
+    }
+  }
+  std::fill(image->begin(), image->end(), 0.0F);
+  for (int y = 0; y < height; ++y) {
+    float* to = image->data() + static_cast<size_t>(y) * w;
+    for (size_t k = 0; k < taps; ++k) {
+      const int row = std::clamp(y + static_cast<int>(k) - radius, 0, height - 1);
+      const float* from = pass.data() + static_cast<size_t>(row) * w;
+      for (size_t x = 0; x < w; ++x) to[x] += kernel[k] * from[x];
+    }
+  }
+}
+
+/// Box filter over the pixel (8 x 8 samples where shapes meet), then optical blur. Pixels without
+/// a ray are black.
+inline std::vector<float> render(const Scene& scene, const Camera& camera, double blur_px = 0.7) {
+  const int w = camera.width(), h = camera.height();
+  const size_t width = static_cast<size_t>(w);
+  ShapeFinder finder(scene, camera);
+  std::vector<double> u(width), v(width);
+  std::vector<int> row, shapes;
+  for (size_t x = 0; x < width; ++x) u[x] = static_cast<double>(x);
+  for (int y = 0; y < h; ++y) {
+    std::fill(v.begin(), v.end(), y);
+    finder.find(u, v, &row);
+    shapes.insert(shapes.end(), row.begin(), row.end());
+  }
+  const auto at = [&](int x, int y) {
+    return static_cast<size_t>(std::clamp(y, 0, h - 1)) * width +
+           static_cast<size_t>(std::clamp(x, 0, w - 1));
+  };
+  constexpr int kSub = 8;
+  std::vector<float> image(shapes.size());
+  std::vector<size_t> mixed;
+  for (int y = 0; y < h; ++y) {
+    mixed.clear();
+    u.clear();
+    v.clear();
+    for (int x = 0; x < w; ++x) {
+      bool same = true;
+      for (int dy = -1; dy <= 1; ++dy) {
+        for (int dx = -1; dx <= 1; ++dx)
+          same = same && shapes[at(x + dx, y + dy)] == shapes[at(x, y)];
+      }
+      image[at(x, y)] = static_cast<float>(finder.greyOf(shapes[at(x, y)]));
+      if (same) continue;
+      mixed.push_back(at(x, y));
+      for (int j = 0; j < kSub; ++j) {
+        for (int i = 0; i < kSub; ++i) {
+          u.push_back(x + (i + 0.5) / kSub - 0.5);
+          v.push_back(y + (j + 0.5) / kSub - 0.5);
         }
-        pass[at(x, y)] = sum;
       }
     }
-    image.swap(pass);
+    finder.find(u, v, &row);
+    for (size_t i = 0; i < mixed.size(); ++i) {
+      double sum = 0;
+      for (size_t k = i * kSub * kSub; k < (i + 1) * kSub * kSub; ++k) {
+        sum += finder.greyOf(row[k]);
+      }
+      image[mixed[i]] = static_cast<float>(sum / (kSub * kSub));
+    }
   }
+  blur(&image, w, h, blur_px);
   return image;
 }
 
