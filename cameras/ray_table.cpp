@@ -2,8 +2,8 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
-#include <array>
 #include <stdexcept>
+#include <utility>
 
 #include "cameras/batch.h"
 #include "cameras/mutant.h"
@@ -11,11 +11,11 @@
 namespace dlsd {
 namespace {
 
-/// Where a cell is measured. The error of the interpolation is largest in the middle of the cell;
-/// the other two tell apart what happens to be right there.
-constexpr std::array<std::array<double, 2>, 3> kProbes = {{{0.5, 0.5}, {0.25, 0.7}, {0.8, 0.3}}};
-/// Between the probes the error may be larger.
-constexpr double kSafety = 4;
+/// A cell is measured in the middle of its four sides. To leading order the error is A(a) g(b) +
+/// B(b) g(a) with g(t) = t (1 - t) (1 + t) (2 - t): on a side one of the two is alone, and A and B,
+/// of opposite signs or changing theirs within the cell, cancel nowhere. (In its middle they may.)
+/// Inside, both add, and higher orders come on top.
+constexpr double kSafety = 3;
 
 /// Rays of a row of positions.
 struct RayRow {
@@ -51,47 +51,49 @@ RayTable::RayTable(const Camera& camera)
     }
   }
 
-  RayRow probes(static_cast<size_t>(columns_) * kProbes.size());
-  for (int y = 0; y < rows_; ++y) {
-    size_t k = 0;
-    for (int x = 0; x < columns_; ++x) {
-      for (const auto& probe : kProbes) {
-        probes.u[k] = (x + probe[0]) * kStepPx - 0.5;
-        probes.v[k++] = (y + probe[1]) * kStepPx - 0.5;
-      }
+  const auto good = [&](const RayRow& probes, size_t probe, size_t node, float a, float b) {
+    if (probes.valid[probe] == 0) return false;
+    const RaySample sample = interpolate({0, node, a, b});
+    const Eigen::Vector3d exact(probes.x[probe], probes.y[probe], probes.z[probe]);
+    const double err_px = (sample.ray - exact).norm() * sample.pxPerRad();
+    const auto J = camera_.jacobian(exact);
+    if (DLSD_MUTANT("invalid-ray-table") || !J) return false;
+    if (DLSD_MUTANT("ray-table-smooth")) return true;
+    Eigen::Matrix<double, 3, 2> D;
+    D << sample.du, sample.dv;
+    return err_px * kSafety <= kMaxErrPx &&
+           (*J * D - Eigen::Matrix2d::Identity()).norm() * kSafety <= kMaxErrPx;
+  };
+  // Neighbours share the rays in the middle of their side, not what they interpolate there.
+  const auto columns = static_cast<size_t>(columns_);
+  RayRow beside(columns + 1), above(columns), below(columns);
+  const auto unprojectSides = [&](int y, RayRow* sides) {
+    for (size_t x = 0; x < columns; ++x) {
+      sides->u[x] = (static_cast<double>(x) + 0.5) * kStepPx - 0.5;
+      sides->v[x] = y * kStepPx - 0.5;
     }
-    probes.unproject(camera_);
-    k = 0;
-    for (int x = 0; x < columns_; ++x) {
-      const size_t node = static_cast<size_t>(y) * nodes_per_row_ + static_cast<size_t>(x);
+    sides->unproject(camera_);
+  };
+  unprojectSides(0, &below);
+  for (int y = 0; y < rows_; ++y) {
+    std::swap(above, below);
+    unprojectSides(y + 1, &below);
+    for (size_t x = 0; x <= columns; ++x) {
+      beside.u[x] = static_cast<double>(x) * kStepPx - 0.5;
+      beside.v[x] = (y + 0.5) * kStepPx - 0.5;
+    }
+    beside.unproject(camera_);
+    for (size_t x = 0; x < columns; ++x) {
+      const size_t node = static_cast<size_t>(y) * nodes_per_row_ + x;
       bool smooth = true;
       for (size_t j = 0; j < 4; ++j) {
         for (size_t i = 0; i < 4; ++i) {
           smooth = smooth && has_ray[node + j * nodes_per_row_ + i] != 0;
         }
       }
-      for (const auto& probe : kProbes) {
-        const size_t here = k++;
-        if (!smooth) continue;
-        if (probes.valid[here] == 0) {
-          smooth = false;
-          continue;
-        }
-        const RaySample sample =
-            interpolate({0, node, static_cast<float>(probe[0]), static_cast<float>(probe[1])});
-        const Eigen::Vector3d exact(probes.x[here], probes.y[here], probes.z[here]);
-        const double err_px = (sample.ray - exact).norm() * sample.pxPerRad();
-        const auto J = camera_.jacobian(exact);
-        smooth = !DLSD_MUTANT("invalid-ray-table") && J &&
-                 (err_px * kSafety <= kMaxErrPx || DLSD_MUTANT("ray-table-smooth"));
-        if (!smooth) continue;
-        Eigen::Matrix<double, 3, 2> D;
-        D << sample.du, sample.dv;
-        smooth = (*J * D - Eigen::Matrix2d::Identity()).norm() * kSafety <= kMaxErrPx ||
-                 DLSD_MUTANT("ray-table-smooth");
-      }
-      smooth_[static_cast<size_t>(y) * static_cast<size_t>(columns_) + static_cast<size_t>(x)] =
-          static_cast<uint8_t>(smooth);
+      smooth = smooth && good(beside, x, node, 0, 0.5F) && good(beside, x + 1, node, 1, 0.5F) &&
+               good(above, x, node, 0.5F, 0) && good(below, x, node, 0.5F, 1);
+      smooth_[static_cast<size_t>(y) * columns + x] = static_cast<uint8_t>(smooth);
     }
   }
 }
