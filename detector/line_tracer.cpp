@@ -387,7 +387,11 @@ void LineTracer::extend(int direction, Front* front) {
 /// line is mostly some other edge, that the curve happens to meet.
 template <class Iterator>
 ptrdiff_t LineTracer::looseQuads(Iterator tip, Iterator other_end) const {
-  const auto levelOf = [&](const Quad& q) { return wide_ ? q.mean.odd_wide : q.mean.odd_narrow; };
+  // Towards the normal: where rows become columns, a response may change its sign.
+  const auto levelOf = [&](const Quad& q) {
+    const float odd = wide_ ? q.mean.odd_wide : q.mean.odd_narrow;
+    return sideOf(q) < 0 && !DLSD_MUTANT("level-side") ? -odd : odd;
+  };
   float level = 0, balance = 0;
   int edges = 0;
   for (Iterator q = tip; q != other_end; ++q) {

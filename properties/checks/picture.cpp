@@ -582,6 +582,9 @@ PictureOutcome checkChanged(const PictureCase& c, const DetectorOptions& options
 // Of the coarser camera. What hides behind the last px of an edge in one picture, and not in the
 // other, may turn a line a little more.
 constexpr double kOtherCameraPx = 0.15, kOtherCameraWorst = 2;
+/// Further apart than this are different edges, however coarse a camera is there (at the fold of a
+/// model a px is any angle).
+constexpr double kSameEdgeRad = 0.1;
 
 /// Whether a picture shows the middle half of an arc as an edge that should be found: 40 px long,
 /// clear of border and rim, of 25 grey levels and even on both sides.
@@ -643,7 +646,7 @@ PictureOutcome checkOtherCamera(const PictureCase& c,
       }
     }
     // Else it is a line of another edge, and this one is missing.
-    const bool is_found = best <= 20 * allowed;
+    const bool is_found = best <= std::min(20 * allowed, kSameEdgeRad);
     if (!is_found && !showsEdge(second, arc)) continue;
     ++outcome.counted;
     if (!is_found) {
