@@ -871,6 +871,10 @@ PictureOutcome checkPaintedAgain(const PictureCase& c,
   return outcome;
 }
 
+/// Nearer to border and rim than so many px lines are taken on unseen: what is 1.5 px beside them
+/// is looked at where it is 2 px clear of the rim.
+constexpr double kSeenPx = 4;
+
 /// Length of a line where the picture shows an edge.
 double shownLength(const Camera& camera, const DetectedLine& line) {
   double length = 0;
@@ -878,7 +882,7 @@ double shownLength(const Camera& camera, const DetectedLine& line) {
   for (int i = 1; i <= count; ++i) {
     const auto p = camera.project(line.arc.at((i - 1.0) / count)),
                q = camera.project(line.arc.at(static_cast<double>(i) / count));
-    if (p && q && isClear(camera, *p, kFilterPx) && isClear(camera, *q, kFilterPx)) {
+    if (p && q && isClear(camera, *p, kSeenPx) && isClear(camera, *q, kSeenPx)) {
       length += (*q - *p).norm();
     }
   }
