@@ -76,7 +76,8 @@ function(dlsd_add_test name)
   add_executable(${name} ${ARG_SOURCES})
   target_link_libraries(${name} PRIVATE ${ARG_LIBS} GTest::gmock GTest::gtest_main dlsd_warnings)
   target_compile_definitions(${name} PRIVATE DLSD_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
-  # What is tested is built as it ships; what tests it builds in two thirds of the time without loop transformations.
+  # The libraries are built as they ship (what their headers hold, not); what tests them builds in two thirds of the time
+  # without loop transformations.
   target_compile_options(${name} PRIVATE $<$<CONFIG:Release>:-O1>)
   if(NOT ARG_SHARDS)
     gtest_discover_tests(${name} DISCOVERY_TIMEOUT 60 TEST_LIST ${name}_tests

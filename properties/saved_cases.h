@@ -17,10 +17,11 @@
 namespace dlsd {
 
 /// Judges check(draw()) on a share of RC_PARAMS' number of cases, as `holds` does, and adds what
-/// came of each to sums with tally(case, outcome); of what RapidCheck tries after a failure,
-/// nothing. An outcome has a `failure` (empty: the property holds) and says whether the property
-/// `applies`; cases to which it doesn't are discarded, after they were tallied. What is thrown is a
-/// failure. Each case is on disk while it is judged. Returns how many cases were judged.
+/// came of each to sums with tally(case, outcome), to the first failure and with it; of what
+/// RapidCheck tries after it, nothing. An outcome has a `failure` (empty: the property holds) and
+/// says whether the property `applies`; cases to which it doesn't are discarded, after they were
+/// tallied. What is thrown is a failure. Each case is on disk while it is judged. Returns how many
+/// cases were judged.
 template <class Draw, class Check, class Tally>
 long holdsOrSaves(double share, const Draw& draw, const Check& check, const Tally& tally) {
   const std::string parent = "counterexamples";
@@ -36,12 +37,12 @@ long holdsOrSaves(double share, const Draw& draw, const Check& check, const Tall
     } catch (const std::exception& e) {
       outcome.failure = std::string("an exception: ") + e.what();
     }
+    if (failed.is_null()) tally(drawn, outcome);
     if (!outcome.failure.empty()) {
       failed = json;
       failure = outcome.failure;
       RC_FAIL(outcome.failure);
     }
-    if (failed.is_null()) tally(drawn, outcome);
     RC_PRE(outcome.applies);
   });
   if (!failed.is_null()) {

@@ -21,7 +21,7 @@ namespace {
 /// Judges a share of RC_PARAMS' number of cases. Returns the sums of what was counted.
 LabelsOutcome expectHolds(LabelProperty property, double share, Worst* worst = nullptr) {
   LabelsOutcome sums;
-  holdsOrSaves(
+  const long cases = holdsOrSaves(
       share,
       [&] { return drawLabelCase(property); },
       [](const LabelCase& label_case) { return checkLabels(label_case); },
@@ -33,6 +33,7 @@ LabelsOutcome expectHolds(LabelProperty property, double share, Worst* worst = n
         sums.round += outcome.round;
         for (const double error : outcome.errors) worst->see(error);
       });
+  EXPECT_GT(sums.counted, cases) << "hardly anything was judged";
   return sums;
 }
 

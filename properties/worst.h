@@ -11,8 +11,8 @@ namespace dlsd {
 /// Worst value of a property, for each kind of input apart. When it goes out of scope, which is
 /// when its test ends, it is printed, recorded with the test, and appended as a line "test, what,
 /// kind, worst, count" (tab-separated) to the file that the environment variable DLSD_WORST names,
-/// if there is one. RapidCheck shrinks a failure only after the worst has been seen, so that the
-/// values of shrunk cases do no harm.
+/// if there is one. Properties show it their first failure, and nothing of what RapidCheck tries to
+/// shrink that.
 class Worst {
  public:
   /// @param what   What is measured, and in which unit.

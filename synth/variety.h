@@ -13,6 +13,9 @@
 
 namespace dlsd {
 
+/// Saved cases carry it: raised with each change after which a seed draws other things.
+inline constexpr const char* kVarietyVersion = "variety/1";
+
 /// Uniform draws from [lo, hi].
 struct VarietyRange {
   double lo, hi;

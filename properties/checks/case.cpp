@@ -117,9 +117,13 @@ FrameCase frameCaseFromJson(const nlohmann::json& json, const std::string& sourc
   if (root.has("distractors")) {  // Cases of the first version have none.
     const std::vector<JsonField> range = root["distractors"].array(2, 2);
     frame_case.variety.distractors = {range[0].number(), range[1].number()};
+    try {
+      frame_case.variety.check();
+    } catch (const std::invalid_argument& error) {
+      root["distractors"].fail(std::string("is out of range: ") + error.what());
+    }
   }
   if (root.has("parts")) {
-    optionsOf(frame_case).check();
     SceneView view = makeSceneView(frame_case.scene, frame_case.seed, frame_case.index);
     addVariety(frame_case.variety, frame_case.seed, frame_case.index, &view);
     frame_case.parts = partsFromJson(root["parts"], view.scene);

@@ -8,8 +8,10 @@
 
 #include "cameras/calibration/files.h"
 #include "detector/test_scene.h"
+#include "properties/checks/scene_parts.h"
 #include "synth/dataset/dataset.h"
 #include "synth/scene.h"
+#include "synth/variety.h"
 
 namespace dlsd {
 namespace {
@@ -61,8 +63,14 @@ std::string overlaySvg(const std::vector<ShownPicture>& shown) {
 }  // namespace
 
 std::string sceneVersionOf(const nlohmann::json& json) {
-  return json.contains("scene") ? presetVersion(json["scene"].get<std::string>())
-                                : test::kSceneVersion;
+  if (!json.contains("scene")) return test::kSceneVersion;
+  std::string version = presetVersion(json["scene"].get<std::string>());
+  const bool has_distractors = json.contains("distractors") && json["distractors"][1] != 0;
+  if (json.value("things_on_top", 0) != 0 || has_distractors) {
+    version += std::string(", ") + kVarietyVersion;
+  }
+  if (json.contains("parts")) version += std::string(", ") + kPartsVersion;
+  return version;
 }
 
 std::string saveCounterexample(const std::string& parent,

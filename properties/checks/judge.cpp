@@ -4,7 +4,9 @@
 
 #include <algorithm>
 #include <exception>
+#include <new>
 
+#include "cameras/calibration/files.h"
 #include "evaluation/detections.h"
 #include "properties/checks/labels.h"
 #include "properties/checks/picture.h"
@@ -69,7 +71,12 @@ std::string otherScene(const nlohmann::json& json, const std::string& source) {
   return fmt::format("the case was saved of {}, the scene is {} now: another picture", was, is);
 }
 
+/// In a handler. That this machine can't judge a case says nothing of it.
 std::string thrown(const std::exception& error) {
+  if (dynamic_cast<const std::bad_alloc*>(&error) != nullptr ||
+      dynamic_cast<const SystemError*>(&error) != nullptr) {
+    throw;
+  }
   return fmt::format("an exception: {}", error.what());
 }
 

@@ -131,11 +131,20 @@ std::string differenceOf(const TwoViews& views,
 void compareLabels(const TwoViews& views, LabelsOutcome* outcome) {
   const std::vector<LabelLine>&lines = views.a.labels.lines, &others = views.b.labels.lines;
   outcome->counted = static_cast<long>(lines.size());
+  Differences differences;
   if (lines.size() != others.size()) {
     outcome->failure = fmt::format("{} labels, {} in the other view", lines.size(), others.size());
+    if (outcome->shown.empty()) return;
+    // The first that has no counterpart, if it is not another kind of difference.
+    size_t i = 0;
+    while (i < std::min(lines.size(), others.size()) &&
+           differenceOf(views, lines[i], others[i], &differences).empty()) {
+      ++i;
+    }
+    if (i < lines.size()) outcome->shown[0].failed = {lines[i].points};
+    if (i < others.size()) outcome->shown[1].failed = {others[i].points};
     return;
   }
-  Differences differences;
   for (size_t i = 0; i < lines.size(); ++i) {
     const std::string what = differenceOf(views, lines[i], others[i], &differences);
     if (what.empty()) continue;
@@ -182,6 +191,8 @@ void comparePictures(const TwoViews& views, double levels, size_t most, LabelsOu
   outcome->failure = fmt::format(
       "{} of {} pixels differ by more than {} grey levels", differ.size(), image.size(), levels);
   if (outcome->shown.empty()) return;
+  constexpr size_t kMostShown = 1000;  // Viewers of SVG don't open any number.
+  differ.resize(std::min(differ.size(), kMostShown));
   for (const Vector2d& pixel : differ) addCross(pixel, &outcome->shown[0]);
 }
 

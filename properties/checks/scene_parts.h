@@ -7,6 +7,9 @@
 
 namespace dlsd {
 
+/// Saved cases with parts carry it: raised with each change after which numbers mean other parts.
+inline constexpr const char* kPartsVersion = "parts/1";
+
 /// How many parts a scene has that can be taken out by themselves: faces that share edges (a solid,
 /// the walls of a room); rods, with faces and caps; balls, discs, tubes; and, as the last ones,
 /// prints, which go with their face, too.
